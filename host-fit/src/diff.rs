@@ -12,7 +12,8 @@
 //! ```
 
 use crate::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
+use runtime::matrix::from_rows;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 use serde_json::{Map, Value, json};
 use std::array::from_fn;
@@ -128,22 +129,22 @@ struct Codes {
 
 impl Codes {
     fn new(set: &ParameterSet) -> Option<Self> {
-        let of_words = |rows: &[[f32; 3]; 3]| Matrix3::from_fn(|i, k| f64::from(rows[i][k]));
         let eta = hallstage_solver::problem::parameters::Parameters::of_set(set).eta();
         let m_per_code = f64::from(set.hall.m_per_code);
-        let plane = of_words(&set.plane);
+        let vertical_per_code = from_rows(&set.constants.vertical_per_code).map(f64::from);
+        let eta = Matrix3::from_diagonal(&Vector3::from(eta));
         Some(Self {
             decoder: set.decoder(),
-            capacitive_per_vertical: of_words(&set.constants.vertical_per_code).try_inverse()?,
-            hall_per_planar: Matrix3::from_fn(|i, k| plane[(i, k)] * eta[i] / m_per_code),
+            capacitive_per_vertical: vertical_per_code.try_inverse()?,
+            hall_per_planar: eta * set.plane.map(f64::from) / m_per_code,
         })
     }
 
     /// The frame that reads about this pose.
     fn at(&self, pose: [f64; 6]) -> RawFrame {
         let codes = |per: &Matrix3<f64>, by: [f64; 3]| {
-            let codes = per * nalgebra::Vector3::from(by);
-            [0, 1, 2].map(|k| codes[k])
+            let codes: [f64; 3] = (per * Vector3::from(by)).into();
+            codes
         };
         let rounded = |codes: [f64; 3]| codes.map(|code| code.round() as i32);
         let [x, y, rz, z, rx, ry] = pose;

@@ -1,17 +1,19 @@
 //! What a fit yields, in SI units and `f64`, and how it becomes a parameter set.
 
-use crate::capacitive::{ProbePositions, vertical_rows};
+use crate::capacitive::{ProbePositions, vertical_per_gap};
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
-use crate::geometry::{ProbeGeometry, inverse_rows};
+use crate::geometry::ProbeGeometry;
 use crate::layout;
+use crate::matrix::{inverse, to_rows};
 use crate::model::{ModelKind, Probes};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
-use crate::real::Number;
+use crate::real::Real;
 use crate::temperature::Temperature;
 use core::f64::consts::TAU;
+use nalgebra::Matrix3;
 
 /// A calibrated stage: the parameters of one model and the scales that they hold for.
 ///
@@ -104,10 +106,10 @@ impl Calibration {
     /// [`ParameterError::CapacitiveProbesInLine`] when the three gaps define no plane, or one that
     /// the largest codes turn by more than a whole turn.
     pub fn constants(&self) -> Result<DecoderConstants<f64>, ParameterError> {
-        let [inverse, vertical] = self.rows()?;
+        let [plane_inverse, vertical_per_m] = self.inverses()?;
         Ok(DecoderConstants {
-            vertical_per_code: vertical.map(|row| row.map(|x| x * self.capacitive_m_per_code)),
-            planar_per_code: inverse.map(|row| row.map(|x| x * self.hall_m_per_code)),
+            vertical_per_code: to_rows(&(vertical_per_m * self.capacitive_m_per_code)),
+            planar_per_code: to_rows(&(plane_inverse * self.hall_m_per_code)),
             calibrated_vertical: self.calibrated_vertical,
             calibrated_planar: self.calibrated_planar,
             sensitivity_min: self.sensitivity_min,
@@ -117,22 +119,21 @@ impl Calibration {
         })
     }
 
-    /// PM^-1, and the rows that make the vertical pose of gaps.
-    fn rows(&self) -> Result<[[[f64; 3]; 3]; 2], ParameterError> {
-        let plane = self.geometry.plane_rows();
-        let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
-        let vertical = vertical_rows(&self.capacitive_probes_m)
-            .filter(|rows| self.largest_tilt_rad(rows) <= TAU)
+    /// PM^-1, and the vertical pose per m of gap change.
+    fn inverses(&self) -> Result<[Matrix3<f64>; 2], ParameterError> {
+        let plane_inverse = inverse(&self.geometry.plane()).ok_or(ParameterError::SingularPlane)?;
+        let vertical_per_m = vertical_per_gap(&self.capacitive_probes_m)
+            .filter(|per_m| self.largest_tilt_rad(per_m) <= TAU)
             .ok_or(ParameterError::CapacitiveProbesInLine)?;
-        Ok([inverse, vertical])
+        Ok([plane_inverse, vertical_per_m])
     }
 
     /// The largest Rx or Ry that codes within the window stand for, rad.
-    fn largest_tilt_rad(&self, [_, rx, ry]: &[[f64; 3]; 3]) -> f64 {
+    fn largest_tilt_rad(&self, vertical_per_m: &Matrix3<f64>) -> f64 {
         let window = &self.capacitive_window;
         let code = f64::from(window.low.unsigned_abs().max(window.high.unsigned_abs()));
-        let per_m = |[a, b, c]: &[f64; 3]| (a.abs() + b.abs()) + c.abs();
-        per_m(rx).max(per_m(ry)) * (self.capacitive_m_per_code * code)
+        let per_m = |axis| vertical_per_m.row(axis).abs().sum();
+        per_m(1).max(per_m(2)) * (self.capacitive_m_per_code * code)
     }
 
     /// The parameter set for the target: everything computed in `f64`, rounded once to `f32`,
@@ -141,7 +142,7 @@ impl Calibration {
     /// # Errors
     /// As [`Calibration::constants`], and every error of [`ParameterSet::check`].
     pub fn prepare(&self, origin: &Origin) -> Result<ParameterSet, ParameterError> {
-        let [inverse, vertical] = self.rows()?;
+        let [plane_inverse, vertical_per_m] = self.inverses()?;
         let mut set = ParameterSet {
             model: self.model,
             serial: origin.serial.clone(),
@@ -152,13 +153,13 @@ impl Calibration {
                 lever_arm_m: self.geometry.lever_arm_m.map(round),
                 misalignment_rad: self.geometry.misalignment_rad.map(round),
             },
-            plane: rounded_rows(self.geometry.plane_rows()),
-            plane_inverse: rounded_rows(inverse),
+            plane: self.geometry.plane().map(round),
+            plane_inverse: plane_inverse.map(round),
             hall: HallInput {
                 m_per_code: round(self.hall_m_per_code),
             },
             capacitive: CapacitiveInput {
-                vertical_per_m: rounded_rows(vertical),
+                vertical_per_m: vertical_per_m.map(round),
                 m_per_code: round(self.capacitive_m_per_code),
             },
             probes: self.probes.rounded(),
@@ -174,16 +175,12 @@ fn round(x: f64) -> f32 {
     f32::from_f64(x)
 }
 
-fn rounded_rows(rows: [[f64; 3]; 3]) -> [[f32; 3]; 3] {
-    rows.map(|row| row.map(round))
-}
-
 impl DecoderConstants<f64> {
     /// Each constant rounded to the nearest `f32`.
     pub fn rounded(&self) -> DecoderConstants<f32> {
         DecoderConstants {
-            vertical_per_code: rounded_rows(self.vertical_per_code),
-            planar_per_code: rounded_rows(self.planar_per_code),
+            vertical_per_code: self.vertical_per_code.map(|row| row.map(round)),
+            planar_per_code: self.planar_per_code.map(|row| row.map(round)),
             calibrated_vertical: self.calibrated_vertical.map(round),
             calibrated_planar: self.calibrated_planar.map(round),
             sensitivity_min: round(self.sensitivity_min),

@@ -3,38 +3,51 @@
 //! The gap at (x, y) changes by g = Z + Rx y - Ry x.
 
 #[cfg(feature = "host")]
-use crate::geometry::inverse_rows;
+use crate::matrix::inverse;
 use crate::model::dot;
 use crate::pose::VerticalPose;
-use crate::real::Number;
-#[cfg(feature = "host")]
 use crate::real::Real;
+#[cfg(feature = "host")]
+use nalgebra::{Matrix3, Vector3};
 
 /// Coordinates of the three capacitive probes, (x, y) in m.
 #[cfg(feature = "host")]
 pub type ProbePositions<T> = [[T; 2]; 3];
 
-/// The rows Z, Rx, Ry of the matrix that turns three gap changes (m) into the vertical
-/// pose (m, rad, rad); `None` when the probes stand in one line.
+/// The plane matrix: gap changes of the three probes (m) per vertical pose (m, rad, rad).
 #[cfg(feature = "host")]
-pub fn vertical_rows<T: Real>(probes_m: &ProbePositions<T>) -> Option<[[T; 3]; 3]> {
-    inverse_rows(&probes_m.map(|[x, y]| [T::ONE, y, -x]))
+pub fn gaps_per_vertical<T: Real>(probes_m: &ProbePositions<T>) -> Matrix3<T> {
+    let [[xa, ya], [xb, yb], [xc, yc]] = *probes_m;
+    #[rustfmt::skip]
+    let plane = Matrix3::new(
+        T::ONE, ya, -xa,
+        T::ONE, yb, -xb,
+        T::ONE, yc, -xc,
+    );
+    plane
 }
 
-/// The vertical pose of three gap changes (or codes, when the scale is in `rows`).
-#[inline(always)]
-pub fn vertical_pose<T: Number>(rows: &[[T; 3]; 3], gaps: [T; 3]) -> VerticalPose<T> {
-    VerticalPose {
-        z_m: dot(&rows[0], gaps),
-        rx_rad: dot(&rows[1], gaps),
-        ry_rad: dot(&rows[2], gaps),
-    }
+/// The inverse of the plane matrix: vertical pose (m, rad, rad) per gap change (m); `None` when
+/// the probes stand in one line.
+#[cfg(feature = "host")]
+pub fn vertical_per_gap<T: Real>(probes_m: &ProbePositions<T>) -> Option<Matrix3<T>> {
+    inverse(&gaps_per_vertical(probes_m))
 }
 
 /// The gap changes, in m, that the three probes read at a vertical pose.
 #[cfg(feature = "host")]
-pub fn gaps_m<T: Number>(probes_m: &ProbePositions<T>, vertical: &VerticalPose<T>) -> [T; 3] {
-    probes_m.map(|[x, y]| (vertical.z_m + vertical.rx_rad * y) - vertical.ry_rad * x)
+pub fn gaps_m<T: Real>(probes_m: &ProbePositions<T>, vertical: &VerticalPose<T>) -> [T; 3] {
+    (gaps_per_vertical(probes_m) * Vector3::from(vertical.to_array())).into()
+}
+
+/// The vertical pose of three codes, by the rows Z, Rx, Ry of its change per code: part of the tick.
+#[inline(always)]
+pub fn vertical_pose<T: Real>(rows: &[[T; 3]; 3], codes: [T; 3]) -> VerticalPose<T> {
+    VerticalPose {
+        z_m: dot(&rows[0], codes),
+        rx_rad: dot(&rows[1], codes),
+        ry_rad: dot(&rows[2], codes),
+    }
 }
 
 #[cfg(test)]
@@ -44,23 +57,26 @@ mod tests {
 
     const PROBES: ProbePositions<f64> = [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]];
 
+    fn vertical(gaps_m: [f64; 3]) -> [f64; 3] {
+        let per_gap = vertical_per_gap(&PROBES).expect("a triangle");
+        (per_gap * Vector3::from(gaps_m)).into()
+    }
+
     #[test]
     fn signs_follow_the_right_hand_rule() {
-        let rows = vertical_rows(&PROBES).expect("a triangle");
         // +Ry lowers the probe on +X and raises the one on -X.
-        let v = vertical_pose(&rows, [-12e-6, 12e-6, 0.0]);
-        assert!((v.ry_rad - 1e-4).abs() < 1e-18 && v.z_m.abs() < 1e-20 && v.rx_rad.abs() < 1e-18);
+        let [z, rx, ry] = vertical([-12e-6, 12e-6, 0.0]);
+        assert!((ry - 1e-4).abs() < 1e-18 && z.abs() < 1e-20 && rx.abs() < 1e-18);
         // +Rx lowers the probe on -Y.
-        let v = vertical_pose(&rows, [0.0, 0.0, -12e-6]);
-        assert!((v.rx_rad - 1e-4).abs() < 1e-18 && v.ry_rad.abs() < 1e-18);
+        let [_, rx, ry] = vertical([0.0, 0.0, -12e-6]);
+        assert!((rx - 1e-4).abs() < 1e-18 && ry.abs() < 1e-18);
     }
 
     proptest! {
         #[test]
         fn gaps_and_vertical_pose_undo_each_other(v in prop::array::uniform3(-5e-4..5e-4f64)) {
-            let rows = vertical_rows(&PROBES).expect("a triangle");
-            let back = vertical_pose(&rows, gaps_m(&PROBES, &VerticalPose::from_array(v)));
-            for (have, want) in back.to_array().iter().zip(v) { prop_assert!((have - want).abs() < 1e-17); }
+            let back = vertical(gaps_m(&PROBES, &VerticalPose::from_array(v)));
+            for (have, want) in back.iter().zip(v) { prop_assert!((have - want).abs() < 1e-17); }
         }
     }
 }

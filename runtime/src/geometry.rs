@@ -9,16 +9,11 @@
 //! probe mounted the other way round. Nothing else depends on the direction, so a blob
 //! stores theta as it is here, and needs no entry for the designed directions.
 //!
-//! Two coordinates of a probe enter PM only through its lever arm, so no data can separate them
+//! Two coordinates of a probe enter PM only through its lever arm, so no data can separate them.
 //! A calibration holds lever arms and thetas; places are kept only as designed values.
-//!
-//! Everything here runs on any [`Number`], so that the target's `f32`, the host's `f64` and
-//! the lanes of a SIMD register use the same functions. Sums and products are written out:
-//! closures over arrays are not always inlined, and would then go through memory.
 
-use crate::real::Number;
-#[cfg(feature = "host")]
 use crate::real::Real;
+use nalgebra::{Matrix3, Vector2};
 
 /// Lever arms and angles of the probes A, B, C: all that PM depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,67 +24,61 @@ pub struct ProbeGeometry<T> {
     pub misalignment_rad: [T; 3],
 }
 
-/// Unit vectors (x, y) along which the probes A, B, C sense: the rows of PM without the arms.
+/// Unit vectors u = (x, y) along which the probes A, B, C sense: the rows of PM without the arms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensingAxes<T>(pub [[T; 2]; 3]);
 
-impl<T: Number> SensingAxes<T> {
+impl<T: Real> SensingAxes<T> {
     /// The axes at the given thetas.
     #[inline(always)]
     pub fn at(misalignment_rad: [T; 3]) -> Self {
-        let [a, b, c] = misalignment_rad;
-        let ((sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)) =
-            (a.sin_cos(), b.sin_cos(), c.sin_cos());
+        let [(sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)] = misalignment_rad.map(T::sin_cos);
         Self([[-sin_a, cos_a], [-sin_b, cos_b], [cos_c, sin_c]])
     }
 
     /// The derivative of each axis by its theta, per rad. It is also the unit vector
     /// across the axis: the axis turned by a right angle.
+    #[cfg(feature = "host")]
     #[inline(always)]
     pub fn across(&self) -> [[T; 2]; 3] {
-        let [a, b, c] = self.0;
-        [[-a[1], a[0]], [-b[1], b[0]], [-c[1], c[0]]]
+        self.0.map(|[x, y]| [-y, x])
     }
 
-    /// The derivatives of each lever arm by x and y of its probe.
+    /// The derivatives (u_y, -u_x) of each lever arm by x and y of its probe.
     #[inline(always)]
     pub fn arm_factors(&self) -> [[T; 2]; 3] {
-        let [a, b, c] = self.0;
-        [[a[1], -a[0]], [b[1], -b[0]], [c[1], -c[0]]]
+        self.0.map(|[x, y]| [y, -x])
     }
 
     /// Lever arms of probes at these places (x, y): the third column of PM (equation 11), m.
     #[inline(always)]
     pub fn lever_arms_m(&self, places_m: [[T; 2]; 3]) -> [T; 3] {
-        let [a, b, c] = self.arm_factors();
-        let [at_a, at_b, at_c] = places_m;
-        [
-            a[0] * at_a[0] + a[1] * at_a[1],
-            b[0] * at_b[0] + b[1] * at_b[1],
-            c[0] * at_c[0] + c[1] * at_c[1],
-        ]
+        let [a, b, c] = self.arm_factors().map(Vector2::from);
+        let [at_a, at_b, at_c] = places_m.map(Vector2::from);
+        [a.dot(&at_a), b.dot(&at_b), c.dot(&at_c)]
     }
 
-    /// The rows of PM (equations 11, 32): displacement sensed by A, B, C, in m, per
-    /// (m, m, rad) of (X, Y, Rz).
+    /// PM (equations 11, 32): displacement sensed by A, B, C, in m, per (m, m, rad) of
+    /// (X, Y, Rz).
     #[inline(always)]
-    pub fn plane_rows(&self, lever_arm_m: [T; 3]) -> [[T; 3]; 3] {
+    pub fn plane(&self, lever_arm_m: [T; 3]) -> Matrix3<T> {
         let [a, b, c] = self.0;
         let [arm_a, arm_b, arm_c] = lever_arm_m;
-        [
-            [a[0], a[1], arm_a],
-            [b[0], b[1], arm_b],
-            [c[0], c[1], arm_c],
-        ]
+        #[rustfmt::skip]
+        let plane = Matrix3::new(
+            a[0], a[1], arm_a,
+            b[0], b[1], arm_b,
+            c[0], c[1], arm_c,
+        );
+        plane
     }
 }
 
 impl SensingAxes<f32> {
-    /// The axes that rows of PM hold, and the lever arms in them, m: the inverse of
-    /// [`SensingAxes::plane_rows`].
-    pub const fn of_rows(rows: &[[f32; 3]; 3]) -> (Self, [f32; 3]) {
-        let [[ax, ay, arm_a], [bx, by, arm_b], [cx, cy, arm_c]] = *rows;
-        (Self([[ax, ay], [bx, by], [cx, cy]]), [arm_a, arm_b, arm_c])
+    /// The axes and the lever arms, m, in PM: the inverse of [`SensingAxes::plane`].
+    pub fn from_plane(plane: &Matrix3<f32>) -> (Self, [f32; 3]) {
+        let [[ax, bx, cx], [ay, by, cy], arms]: [[f32; 3]; 3] = (*plane).into();
+        (Self([[ax, ay], [bx, by], [cx, cy]]), arms)
     }
 
     /// theta of each axis, -pi to pi, whatever its length: the inverse of
@@ -105,53 +94,26 @@ impl SensingAxes<f32> {
     }
 }
 
-impl<T: Number> ProbeGeometry<T> {
+impl<T: Real> ProbeGeometry<T> {
     /// The geometry of probes that stand at these places (x, y).
-    pub fn of_places(places_m: [[T; 2]; 3], misalignment_rad: [T; 3]) -> Self {
+    pub fn from_places(places_m: [[T; 2]; 3], misalignment_rad: [T; 3]) -> Self {
         Self {
             lever_arm_m: SensingAxes::at(misalignment_rad).lever_arms_m(places_m),
             misalignment_rad,
         }
     }
 
-    /// The rows of PM (equations 11, 32): displacement sensed by A, B, C, in m, per
-    /// (m, m, rad) of (X, Y, Rz).
-    pub fn plane_rows(&self) -> [[T; 3]; 3] {
-        SensingAxes::at(self.misalignment_rad).plane_rows(self.lever_arm_m)
+    /// PM (equations 11, 32): displacement sensed by A, B, C, in m, per (m, m, rad) of
+    /// (X, Y, Rz).
+    pub fn plane(&self) -> Matrix3<T> {
+        SensingAxes::at(self.misalignment_rad).plane(self.lever_arm_m)
     }
-}
-
-/// The inverse of a 3x3 matrix by its adjugate, in a written order, and its determinant.
-/// Where that is zero, the inverse is not finite.
-#[inline(always)]
-pub fn inverse_and_determinant<T: Number>(m: &[[T; 3]; 3]) -> ([[T; 3]; 3], T) {
-    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
-    let cofactor_a = e * i - f * h;
-    let cofactor_b = f * g - d * i;
-    let cofactor_c = d * h - e * g;
-    let determinant = (a * cofactor_a + b * cofactor_b) + c * cofactor_c;
-    let r = T::ONE / determinant;
-    let inverse = [
-        [cofactor_a * r, (c * h - b * i) * r, (b * f - c * e) * r],
-        [cofactor_b * r, (a * i - c * g) * r, (c * d - a * f) * r],
-        [cofactor_c * r, (b * g - a * h) * r, (a * e - b * d) * r],
-    ];
-    (inverse, determinant)
-}
-
-/// The inverse of a 3x3 matrix by its adjugate; `None` when the determinant is zero,
-/// subnormal (as `f32`) or not finite.
-#[cfg(feature = "host")]
-pub fn inverse_rows<T: Real>(m: &[[T; 3]; 3]) -> Option<[[T; 3]; 3]> {
-    let (inverse, determinant) = inverse_and_determinant(m);
-    let size = determinant.to_f64().abs();
-    (size.is_finite() && size > f64::from(f32::MIN_POSITIVE)).then_some(inverse)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::dot;
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     /// The places of the paper's stage.
@@ -164,14 +126,14 @@ mod tests {
         let half_turn = core::f64::consts::PI;
         for theta in [[0.03, -0.05, 0.08], [half_turn, 1.9, 0.5 - half_turn]] {
             for place in [[0.4, -0.1], [0.1, 0.3]] {
-                let rows = ProbeGeometry::of_places([place; 3], theta).plane_rows();
-                for (k, row) in rows.iter().enumerate() {
+                let [x, y, rz] = [3e-4, -2e-4, 1e-4];
+                let plane = ProbeGeometry::from_places([place; 3], theta).plane();
+                let read = plane * Vector3::new(x, y, rz);
+                for (k, read) in read.iter().enumerate() {
                     let standard = if k < 2 { half_turn / 2.0 } else { 0.0 };
                     let axis = ((standard + theta[k]).cos(), (standard + theta[k]).sin());
-                    let [x, y, rz] = [3e-4, -2e-4, 1e-4];
                     let moved = (x - rz * place[1], y + rz * place[0]);
                     let expected = axis.0 * moved.0 + axis.1 * moved.1;
-                    let read = row[0] * x + row[1] * y + row[2] * rz;
                     assert!((read - expected).abs() < 1e-18, "probe {k}");
                 }
             }
@@ -179,20 +141,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn inverse_times_matrix_is_identity(t in prop::array::uniform3(-0.14..0.14f64),
-                                            arms in prop::array::uniform3(0.1..0.5f64)) {
-            let geometry = ProbeGeometry { lever_arm_m: [arms[0], -arms[1], -arms[2]], misalignment_rad: t };
-            let rows = geometry.plane_rows();
-            let inverse = inverse_rows(&rows).expect("a sound geometry");
-            for (i, row) in inverse.iter().enumerate() {
-                for j in 0..3 {
-                    let product = dot(row, rows.map(|row| row[j]));
-                    prop_assert!((product - f64::from(u8::from(i == j))).abs() < 1e-12);
-                }
-            }
-        }
-
         /// Derivatives by differences: of the axes by the misalignment, of the arms by the coordinates.
         #[test]
         fn derivatives_are_those_of_axes_and_arms(t in prop::array::uniform3(-0.14..0.14f64)) {
@@ -211,21 +159,11 @@ mod tests {
         }
 
         #[test]
-        fn misalignments_and_arms_can_be_read_from_the_rows_of_pm(t in prop::array::uniform3(-3.1..3.1f32),
-                                                                  arms in prop::array::uniform3(-0.5..0.5f32)) {
-            let rows = SensingAxes::at(t).plane_rows(arms);
-            let (axes, found) = SensingAxes::of_rows(&rows);
+        fn misalignments_and_arms_can_be_read_from_pm(t in prop::array::uniform3(-3.1..3.1f32),
+                                                      arms in prop::array::uniform3(-0.5..0.5f32)) {
+            let (axes, found) = SensingAxes::from_plane(&SensingAxes::at(t).plane(arms));
             prop_assert_eq!(found, arms);
             for (have, want) in axes.misalignment_rad().iter().zip(t) { prop_assert!((have - want).abs() < 3e-7); }
         }
-    }
-
-    #[test]
-    fn a_singular_matrix_has_no_inverse() {
-        assert_eq!(
-            inverse_rows(&[[1.0f64, 2.0, 3.0], [2.0, 4.0, 6.0], [0.0, 1.0, 0.0]]),
-            None
-        );
-        assert_eq!(inverse_rows(&[[f32::NAN; 3]; 3]), None);
     }
 }

@@ -13,12 +13,14 @@
 
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
-use crate::geometry::{ProbeGeometry, SensingAxes, inverse_and_determinant};
+use crate::geometry::{ProbeGeometry, SensingAxes};
+use crate::matrix::{from_rows, inverse_and_determinant, to_rows};
 use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
 use core::slice;
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 /// What stands before the hash of the logs.
@@ -79,8 +81,8 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         visit("the probe geometry", misalignment_rad);
     }
     if matrices {
-        visit("PM", plane.as_flattened_mut());
-        visit("PM^-1", plane_inverse.as_flattened_mut());
+        visit_matrix("PM", plane, visit);
+        visit_matrix("PM^-1", plane_inverse, visit);
     }
     visit("the scale of the Hall codes", slice::from_mut(m_per_code));
     let CapacitiveInput {
@@ -88,10 +90,7 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         m_per_code,
     } = capacitive;
     if matrices {
-        visit(
-            "the capacitive plane matrix",
-            vertical_per_m.as_flattened_mut(),
-        );
+        visit_matrix("the capacitive plane matrix", vertical_per_m, visit);
     }
     visit(
         "the scale of the capacitive codes",
@@ -133,6 +132,18 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
             temperature.per_mk.as_flattened_mut(),
         );
     }
+}
+
+/// Visits a matrix row by row.
+#[inline(never)]
+fn visit_matrix(
+    group: &'static str,
+    matrix: &mut Matrix3<f32>,
+    visit: &mut dyn FnMut(&'static str, &mut [f32]),
+) {
+    let mut rows = to_rows(matrix);
+    visit(group, rows.as_flattened_mut());
+    *matrix = from_rows(&rows);
 }
 
 fn visit_sensitivity(
@@ -187,19 +198,15 @@ fn visit_field_probe(
 pub(crate) fn restore(set: &mut ParameterSet) {
     if let Probes::Field(_) = set.probes {
         let c = &set.constants;
-        set.plane_inverse = over(&c.planar_per_code, set.hall.m_per_code);
+        set.plane_inverse = from_rows(&c.planar_per_code) / set.hall.m_per_code;
         set.plane = inverse_and_determinant(&set.plane_inverse).0;
-        set.capacitive.vertical_per_m = over(&c.vertical_per_code, set.capacitive.m_per_code);
+        set.capacitive.vertical_per_m = from_rows(&c.vertical_per_code) / set.capacitive.m_per_code;
         if c.temperature.is_used() {
-            let (axes, arms) = SensingAxes::of_rows(&set.plane);
+            let (axes, arms) = SensingAxes::from_plane(&set.plane);
             set.geometry.lever_arm_m = arms;
             set.geometry.misalignment_rad = axes.misalignment_rad();
         }
     }
-}
-
-fn over(rows: &[[f32; 3]; 3], divisor: f32) -> [[f32; 3]; 3] {
-    rows.map(|row| row.map(|x| x / divisor))
 }
 
 /// Writes the payload of a set and gives its length; `None` if `room` is too small.
@@ -266,8 +273,8 @@ pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSe
             ..FitRecord::default()
         },
         geometry: ProbeGeometry::default(),
-        plane: [[0.0; 3]; 3],
-        plane_inverse: [[0.0; 3]; 3],
+        plane: Matrix3::zeros(),
+        plane_inverse: Matrix3::zeros(),
         hall: HallInput::default(),
         capacitive: CapacitiveInput::default(),
         probes: match head.model {

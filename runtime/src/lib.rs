@@ -16,6 +16,7 @@
 //! | [`pose`] | the pose, its frame and its signs (one drawing) |
 //! | [`geometry`] | lever arms, misalignments and the plane matrix PM (equations 11, 32) |
 //! | [`model`] | what a model is; Models (12), (15), (30) and (31), for `f32` and `f64` |
+//! | [`matrix`] | the inverse of a 3 x 3 matrix |
 //! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
 //! | [`frame`] | codes as the converters gave them, and what makes a code bad |
 //! | [`status`] | the documented bit mask that goes with every pose |
@@ -60,6 +61,10 @@ pub mod geometry;
 #[cfg(not(feature = "host"))]
 mod geometry;
 mod layout;
+#[cfg(feature = "host")]
+pub mod matrix;
+#[cfg(not(feature = "host"))]
+mod matrix;
 pub mod model;
 pub mod parameters;
 pub mod pose;

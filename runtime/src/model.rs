@@ -18,7 +18,7 @@ pub use linear::{
 };
 
 use crate::pose::{PlanarPose, VerticalPose};
-use crate::real::{Number, Real};
+use crate::real::Real;
 use core::fmt;
 use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
@@ -190,19 +190,19 @@ impl<T: Real> Probes<T> {
 
 /// G phi, from G - 1. At G = 1 it is phi, to the bit, if that is finite.
 #[inline(always)]
-pub fn with_gain<T: Number>(phi: T, gain_change: T) -> T {
+pub fn with_gain<T: Real>(phi: T, gain_change: T) -> T {
     phi + phi * gain_change
 }
 
 /// The product of a row and a column of three, summed from the left.
 #[inline(always)]
-pub fn dot<T: Number>(row: &[T; 3], column: [T; 3]) -> T {
+pub fn dot<T: Real>(row: &[T; 3], column: [T; 3]) -> T {
     (row[0] * column[0] + row[1] * column[1]) + row[2] * column[2]
 }
 
 /// As [`dot`], less `offset`, which is subtracted from the first product: a core with a
 /// multiply-and-subtract does both in one instruction.
 #[inline(always)]
-pub fn dot_less<T: Number>(row: &[T; 3], column: [T; 3], offset: T) -> T {
+pub fn dot_less<T: Real>(row: &[T; 3], column: [T; 3], offset: T) -> T {
     ((row[0] * column[0] - offset) + row[1] * column[1]) + row[2] * column[2]
 }

@@ -4,6 +4,7 @@ use crate::decoder::{AnyDecoder, Decoder, DecoderConstants};
 use crate::geometry::ProbeGeometry;
 use crate::model::{ModelKind, Probes};
 use heapless::String;
+use nalgebra::Matrix3;
 
 /// A short text of a parameter set: at most 32 bytes of UTF-8.
 pub type Text = String<32>;
@@ -40,10 +41,10 @@ pub struct ParameterSet {
     pub fit: FitRecord,
     /// Lever arms and misalignments.
     pub geometry: ProbeGeometry<f32>,
-    /// Rows of PM (equation 32).
-    pub plane: [[f32; 3]; 3],
-    /// Rows of PM^-1.
-    pub plane_inverse: [[f32; 3]; 3],
+    /// PM (equation 32).
+    pub plane: Matrix3<f32>,
+    /// PM^-1.
+    pub plane_inverse: Matrix3<f32>,
     /// Scale of the Hall codes.
     pub hall: HallInput,
     /// Scale and geometry of the capacitive codes.
@@ -64,8 +65,8 @@ pub struct HallInput {
 /// How capacitive codes become the vertical pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CapacitiveInput {
-    /// Rows Z, Rx, Ry of the plane matrix: m, rad, rad per m of gap change.
-    pub vertical_per_m: [[f32; 3]; 3],
+    /// Z, Rx, Ry in m, rad, rad per m of gap change: the inverse of the plane matrix.
+    pub vertical_per_m: Matrix3<f32>,
     /// Gap change per code, m.
     pub m_per_code: f32,
 }

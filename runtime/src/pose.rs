@@ -16,14 +16,7 @@
 //! displacement from there. Positions are given for the stage of `stage.toml`: the true
 //! probe positions are what a calibration finds.
 
-use crate::real::Number;
-
-/// `f` of each of three numbers with its counterpart, written out: `array::from_fn` becomes a loop at
-/// opt-level "s".
-#[inline(always)]
-pub(crate) fn pairwise(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) -> [f32; 3] {
-    [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
-}
+use crate::real::Real;
 
 /// Motion in the plane, by the Hall probes: X and Y in m, Rz in rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,7 +55,7 @@ pub struct Pose {
     pub vertical: VerticalPose<f32>,
 }
 
-impl<T: Number> PlanarPose<T> {
+impl<T: Real> PlanarPose<T> {
     /// No displacement.
     pub const ZERO: Self = Self {
         x_m: T::ZERO,
@@ -81,7 +74,7 @@ impl<T: Number> PlanarPose<T> {
     }
 }
 
-impl<T: Number> VerticalPose<T> {
+impl<T: Real> VerticalPose<T> {
     /// No displacement.
     pub const ZERO: Self = Self {
         z_m: T::ZERO,

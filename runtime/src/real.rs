@@ -2,65 +2,34 @@
 //!
 //! Only the core operators, which IEEE 754 rounds the same everywhere, and sine and
 //! cosine from `libm`, whose code is the same on every machine. No fused multiply-add
-//! and no function whose backend a feature could switch: that is what makes the
-//! target's words equal the host's.
+//! and no function whose backend a feature could switch: so the target's words equal the
+//! host's.
 
-use core::fmt::Debug;
-use core::ops::{Add, Div, Mul, Neg, Sub};
+use nalgebra::{Field, Scalar};
 
-/// What the equations of geometry and models are written in: one floating-point number, or
-/// several side by side in a SIMD register, on which every operation works one by one.
-pub trait Number:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-{
+/// One floating-point number: `f32` on the target, `f64` on the host.
+pub trait Real: Field + Scalar + Copy + PartialOrd + Send + Sync {
     /// Zero.
     const ZERO: Self;
     /// One.
     const ONE: Self;
     /// The nearest number of this type to `value`.
     fn from_f64(value: f64) -> Self;
-    /// Sine and cosine of an angle in rad, by `libm`.
-    fn sin_cos(self) -> (Self, Self);
-}
-
-/// One floating-point number: `f32` on the target, `f64` on the host.
-pub trait Real: Number + PartialOrd + Debug + Send + Sync + 'static {
     /// The nearest number to an ADC code (exact for codes of up to 24 bits).
     fn from_code(code: i32) -> Self;
     /// This number as `f64`, exactly.
     fn to_f64(self) -> f64;
+    /// Sine and cosine of an angle in rad, by `libm`.
+    fn sin_cos(self) -> (Self, Self);
 }
 
-impl Number for f32 {
+impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         value as f32
     }
-    fn sin_cos(self) -> (Self, Self) {
-        libm::sincosf(self)
-    }
-}
-
-impl Number for f64 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
-    #[inline(always)]
-    fn from_f64(value: f64) -> Self {
-        value
-    }
-    fn sin_cos(self) -> (Self, Self) {
-        libm::sincos(self)
-    }
-}
-
-impl Real for f32 {
     #[inline(always)]
     fn from_code(code: i32) -> Self {
         code as f32
@@ -69,9 +38,18 @@ impl Real for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincosf(self)
+    }
 }
 
 impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        value
+    }
     #[inline(always)]
     fn from_code(code: i32) -> Self {
         f64::from(code)
@@ -79,5 +57,8 @@ impl Real for f64 {
     #[inline(always)]
     fn to_f64(self) -> f64 {
         self
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
     }
 }

@@ -2,10 +2,12 @@
 
 use crate::calibration::{Calibration, Origin};
 use crate::frame::CodeWindow;
-use crate::geometry::{ProbeGeometry, SensingAxes, inverse_rows};
-use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape, dot};
+use crate::geometry::{ProbeGeometry, SensingAxes};
+use crate::matrix::inverse;
+use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
 use crate::parameters::{FitRecord, ParameterSet, Text};
 use crate::temperature::Temperature;
+use nalgebra::RowVector3;
 
 /// Codes strictly between the rails of a 16-bit converter.
 pub(crate) const WINDOW: CodeWindow = CodeWindow {
@@ -78,8 +80,7 @@ pub(crate) fn sensitivities(set: &mut ParameterSet) -> &mut [Sensitivity<f32>; 3
 /// signs that change, and the probes where their sensitivities put them.
 pub(crate) fn field_calibration() -> Calibration {
     let linear = calibration();
-    let plane = linear.geometry.plane_rows();
-    let inverse = inverse_rows(&plane).expect("a sound stage");
+    let plane_inverse = inverse(&linear.geometry.plane()).expect("a sound stage");
     let across = SensingAxes::at(linear.geometry.misalignment_rad).across();
     let probe = |k: usize, sign: f64| {
         let sensitivity = *linear.probes.sensitivities()[k];
@@ -89,14 +90,13 @@ pub(crate) fn field_calibration() -> Calibration {
             sensitivity.per_ry_rad,
         );
         let [x, y] = across[k];
-        let row = [x, y, y * (-c / a) - x * (b / a)];
+        let row = RowVector3::new(x, y, y * (-c / a) - x * (b / a));
         let m = linear.hall_m_per_code;
-        let column = |j: usize| inverse.map(|row| row[j]);
         FieldProbe {
             sensitivity,
             carry: [0.06 * sign / m, -0.022 * sign / m, 0.013 * sign / m],
             shape: shape(sign / 3.0, m * 1e3, sensitivity.eta),
-            lateral: [0, 1, 2].map(|j| dot(&row, column(j))),
+            lateral: (row * plane_inverse).into(),
         }
     };
     Calibration {

@@ -3,9 +3,11 @@
 use crate::frame::CODE_MAGNITUDE_MAX;
 use crate::geometry::SensingAxes;
 use crate::layout;
-use crate::model::{FieldProbe, Probes, Sensitivity, dot};
+use crate::matrix::{from_rows, to_rows};
+use crate::model::{FieldProbe, Probes, Sensitivity};
 use crate::parameters::{ParameterError, ParameterSet, RANGE_MAX};
 use core::f32::consts::{PI, TAU};
+use nalgebra::Matrix3;
 
 /// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
 /// for lever arms of decimetres.
@@ -94,15 +96,10 @@ impl ParameterSet {
     }
 
     fn check_inverse(&self) -> Result<(), ParameterError> {
-        let mut largest = 0.0f32;
-        for j in 0..3 {
-            let column = self.plane_inverse.map(|row| row[j]);
-            for (i, row) in self.plane.iter().enumerate() {
-                let off = (dot(row, column) - if i == j { 1.0 } else { 0.0 }).abs();
-                // A sum of overflows is no number, and larger than any.
-                largest = if off <= largest { largest } else { off };
-            }
-        }
+        let off = product(&self.plane, &self.plane_inverse) - Matrix3::identity();
+        // A sum of overflows is no number, and larger than any.
+        let larger = |largest, off| if off <= largest { largest } else { off };
+        let largest = off.iter().map(|off| off.abs()).fold(0.0, larger);
         if largest <= INVERSE_TOLERANCE {
             Ok(())
         } else {
@@ -114,17 +111,17 @@ impl ParameterSet {
         let c = &self.constants;
         check_scaled(
             "the planar constants",
-            c.planar_per_code.as_flattened(),
-            self.plane_inverse.as_flattened(),
+            &c.planar_per_code,
+            &self.plane_inverse,
             self.hall.m_per_code,
         )?;
         check_scaled(
             "the vertical constants",
-            c.vertical_per_code.as_flattened(),
-            self.capacitive.vertical_per_m.as_flattened(),
+            &c.vertical_per_code,
+            &self.capacitive.vertical_per_m,
             self.capacitive.m_per_code,
         )?;
-        let (axes, arms) = SensingAxes::of_rows(&self.plane);
+        let (axes, arms) = SensingAxes::from_plane(&self.plane);
         let lengths = axes.0.map(|[x, y]| x * x + y * y);
         let mut turned = axes.misalignment_rad();
         for (found, stored) in turned.iter_mut().zip(self.geometry.misalignment_rad) {
@@ -140,49 +137,49 @@ impl ParameterSet {
         check_near("PM", &lengths, &[1.0; 3])?;
         match &self.probes {
             Probes::Linear(_) => Ok(()),
-            Probes::Field(probes) => self.check_lateral(probes, &axes),
+            Probes::Field(probes) => self.check_lateral(probes),
         }
     }
 
     /// Within the calibrated range the terms of a field model change a displacement by less than
     /// it changes itself.
     fn check_slopes(&self, probes: &[FieldProbe<f32>; 3]) -> Result<(), ParameterError> {
-        let (planar, vertical) = (
-            &self.constants.calibrated_planar,
-            &self.constants.calibrated_vertical,
-        );
-        let [a, b, c] = &self.plane;
-        for ((index, probe), along) in (0u8..).zip(probes).zip(&self.plane) {
-            let (mut u, mut w) = (0.0, 0.0);
-            for axis in 0..3 {
-                let codes = planar[axis] / self.hall.m_per_code;
-                u += along[axis].abs() * codes;
-                w += dot(&probe.lateral, [a[axis], b[axis], c[axis]]).abs() * codes;
-            }
-            let zr = swing(&probe.sensitivity, vertical);
-            let gentle = |slope: f32| slope < 1.0;
-            if !probe.steepest_slopes(u, w, zr).into_iter().all(gentle) {
-                return Err(ParameterError::SteepInRange { probe: index });
+        let c = &self.constants;
+        let codes = c.calibrated_planar.map(|q| q / self.hall.m_per_code);
+        let (along, across) = (to_rows(&self.plane), to_rows(&self.lateral(probes)));
+        for (k, probe) in probes.iter().enumerate() {
+            let (u, w) = (reach(&along[k], &codes), reach(&across[k], &codes));
+            let zr = swing(&probe.sensitivity, &c.calibrated_vertical);
+            let [per_u, per_w] = probe.steepest_slopes(u, w, zr);
+            let is_gentle = per_u < 1.0 && per_w < 1.0;
+            if !is_gentle {
+                return Err(ParameterError::SteepInRange { probe: k as u8 });
             }
         }
         Ok(())
     }
 
+    /// W: displacement across the axes of the probes per (X, Y, Rz).
+    #[inline(never)]
+    fn lateral(&self, probes: &[FieldProbe<f32>; 3]) -> Matrix3<f32> {
+        let rows = probes.each_ref().map(|probe| probe.lateral);
+        product(&from_rows(&rows), &self.plane)
+    }
+
     /// The lateral rows of a field model, times PM, begin with the unit vectors across the
     /// sensing axes; the rest is where the probes stand.
-    fn check_lateral(
-        &self,
-        probes: &[FieldProbe<f32>; 3],
-        axes: &SensingAxes<f32>,
-    ) -> Result<(), ParameterError> {
-        for axis in 0..2 {
-            let column = self.plane.map(|row| row[axis]);
-            let made = probes.each_ref().map(|probe| dot(&probe.lateral, column));
-            let across = axes.across().map(|pair| pair[axis]);
-            check_near("the lateral rows", &made, &across)?;
-        }
-        Ok(())
+    fn check_lateral(&self, probes: &[FieldProbe<f32>; 3]) -> Result<(), ParameterError> {
+        let [along_x, along_y, _]: [[f32; 3]; 3] = self.plane.into();
+        let [across_x, across_y, _]: [[f32; 3]; 3] = self.lateral(probes).into();
+        check_near("the lateral rows", &across_x, &along_y.map(|y| -y))?;
+        check_near("the lateral rows", &across_y, &along_x)
     }
+}
+
+/// A function of its own: inlined, each product takes 150 bytes of flash.
+#[inline(never)]
+fn product(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
+    a * b
 }
 
 /// Refuses what differs by more than rounding from what it was made of: m, rad or 1.
@@ -200,11 +197,11 @@ fn check_near(term: &'static str, made: &[f32; 3], from: &[f32; 3]) -> Result<()
 #[inline(never)]
 fn check_scaled(
     term: &'static str,
-    made: &[f32],
-    from: &[f32],
+    made: &[[f32; 3]; 3],
+    from: &Matrix3<f32>,
     scale: f32,
 ) -> Result<(), ParameterError> {
-    for (made, from) in made.iter().zip(from) {
+    for (made, from) in (made.as_flattened().iter()).zip(to_rows(from).as_flattened()) {
         let product = from * scale;
         let allowed = PRODUCT_TOLERANCE * product.abs() + f32::MIN_POSITIVE;
         let follows = (made - product).abs() <= allowed;
@@ -223,7 +220,13 @@ fn smallest_sensitivity(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
 
 /// The largest |phi - eta| over that box.
 fn swing(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
-    (s.per_z_m.abs() * limits[0] + s.per_rx_rad.abs() * limits[1]) + s.per_ry_rad.abs() * limits[2]
+    reach(&[s.per_z_m, s.per_rx_rad, s.per_ry_rad], limits)
+}
+
+/// The largest product of a row and a column whose magnitudes are at most `limits`.
+#[inline(never)]
+fn reach([a, b, c]: &[f32; 3], limits: &[f32; 3]) -> f32 {
+    (a.abs() * limits[0] + b.abs() * limits[1]) + c.abs() * limits[2]
 }
 
 #[cfg(test)]

@@ -40,10 +40,10 @@ fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
     let of_31: [(&str, ChangeTo); 12] = [
         ("the fit record", |s, x| s.fit.peak[2] = x),
         ("the probe geometry", |s, x| s.geometry.lever_arm_m[0] = x),
-        ("PM", |s, x| s.plane[2][2] = x),
-        ("PM^-1", |s, x| s.plane_inverse[0][0] = x),
+        ("PM", |s, x| s.plane.m33 = x),
+        ("PM^-1", |s, x| s.plane_inverse.m11 = x),
         ("the scale of the Hall codes", |s, x| s.hall.m_per_code = x),
-        ("the capacitive plane matrix", |s, x| s.capacitive.vertical_per_m[1][1] = x),
+        ("the capacitive plane matrix", |s, x| s.capacitive.vertical_per_m.m22 = x),
         ("the scale of the capacitive codes", |s, x| s.capacitive.m_per_code = x),
         ("the vertical constants", |s, x| s.constants.vertical_per_code[2][2] = x),
         ("the sensitivities", |s, x| sensitivities(s)[2].per_ry_rad = x),
@@ -114,25 +114,28 @@ fn what_cannot_be_or_does_not_follow_is_refused_by_its_reason() {
 
 /// A sensing axis twice as long as a unit vector.
 fn twice_as_long(set: &mut ParameterSet) {
-    set.plane[0] = set.plane[0].map(|x| 2.0 * x);
+    let mut row = set.plane.row_mut(0);
+    row *= 2.0;
     set.geometry.lever_arm_m[0] *= 2.0;
-    for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
-        rows.iter_mut().for_each(|row| row[0] *= 0.5);
-    }
+    let mut column = set.plane_inverse.column_mut(0);
+    column *= 0.5;
+    (set.constants.planar_per_code.iter_mut()).for_each(|row| row[0] *= 0.5);
 }
 
 #[test]
 fn what_does_not_invert_pm_is_refused() {
     let is_off = |error| matches!(error, ParameterError::NotTheInverse { largest } if largest > INVERSE_TOLERANCE || largest.is_nan());
-    assert!(is_off(refused_31(|s| s.plane_inverse[0][1] *= 1.001)));
-    let overflow = [[f32::MAX, f32::MAX, -f32::MAX]; 3];
+    assert!(is_off(refused_31(|s| s.plane_inverse.m12 *= 1.001)));
+    let overflow = from_rows(&[[f32::MAX, f32::MAX, -f32::MAX]; 3]);
     assert!(is_off(refused_31(|s| s.plane_inverse = overflow)));
     assert!(is_off(refused_31(|s| {
-        s.plane[1] = s.plane[0];
+        s.plane.set_row(1, &s.plane.row(0).into_owned());
         s.geometry.lever_arm_m[1] = s.geometry.lever_arm_m[0];
         s.geometry.misalignment_rad[1] = s.geometry.misalignment_rad[0];
     })));
-    assert!(is_off(refused_field(|s| s.plane = [[f32::NAN; 3]; 3])));
+    assert!(is_off(refused_field(
+        |s| s.plane = Matrix3::repeat(f32::NAN)
+    )));
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use crate::job::{self, Bare, Head};
 use host_fit::input::dataset::Dataset;
+use nalgebra::RowVector3;
 use rand::{Rng, RngExt};
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::SensingAxes;
-use runtime::model::{FieldProbe, Probes, Sensitivity, Shape, dot};
+use runtime::model::{FieldProbe, Probes, Sensitivity, Shape};
 use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose, RawFrame, Temperature};
 
 /// One section: parameters as they lie in the file, and the frames.
@@ -199,14 +200,12 @@ pub fn with_temperature(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet 
 
 /// The parameter set of Model (31) with random terms of the field model added.
 pub fn with_field_terms(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
-    let (axes, _) = SensingAxes::of_rows(&set.plane);
+    let (axes, _) = SensingAxes::from_plane(&set.plane);
     let [a, b, c] = set.probes.sensitivities();
     let [across_a, across_b, across_c] = axes.across();
     let probes = [(a, across_a), (b, across_b), (c, across_c)].map(|(sensitivity, [x, y])| {
-        let row = [x, y, rng.random_range(-0.4..0.4)];
-        let column = |k: usize| set.plane_inverse.map(|row| row[k]);
-        let lateral = [0, 1, 2].map(|k| dot(&row, column(k)));
-        field_probe(rng, sensitivity, lateral)
+        let row = RowVector3::new(x, y, rng.random_range(-0.4..0.4));
+        field_probe(rng, sensitivity, (row * set.plane_inverse).into())
     });
     ParameterSet {
         model: ModelKind::Field,

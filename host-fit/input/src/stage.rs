@@ -166,7 +166,7 @@ impl Stage {
 
     /// Lever arms and thetas of the designed probes.
     pub fn geometry(&self) -> ProbeGeometry<f64> {
-        ProbeGeometry::of_places(self.places_m(), self.probes.map(|probe| probe.theta_rad))
+        ProbeGeometry::from_places(self.places_m(), self.probes.map(|probe| probe.theta_rad))
     }
 }
 

@@ -8,8 +8,9 @@ use super::sensors::{ReferenceError, SensorErrors, beams_m, code, gaps_m};
 use super::thermal::{Climate, HELD_S, Thermal, Thermometers};
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::stage::Stage;
+use nalgebra::{Matrix3, Vector3};
 use runtime::RawFrame;
-use runtime::capacitive::{vertical_pose, vertical_rows};
+use runtime::capacitive::vertical_per_gap;
 use runtime::frame::MISSING_CODE;
 
 /// Why a run cannot be simulated.
@@ -201,13 +202,13 @@ impl Recording {
 
     /// What reading several logs gives.
     pub fn joined(logs: &[&Self], stage: &Stage) -> Option<Dataset> {
-        let plane = vertical_rows(&stage.capacitive_probes_m)?;
+        let per_gap = vertical_per_gap(&stage.capacitive_probes_m)?;
         let mut dataset = Dataset::default();
         for (log, recording) in logs.iter().enumerate() {
             for (index, samples) in (0..).zip(&recording.movements) {
                 let (start, movement) = (dataset.rows.len(), dataset.movements.len());
                 let rows = (0..).zip(samples);
-                let rows = rows.map(|(k, sample)| row(stage, &plane, movement, k, sample));
+                let rows = rows.map(|(k, sample)| row(stage, &per_gap, movement, k, sample));
                 dataset.rows.extend(rows);
                 dataset.movements.push(Movement {
                     log,
@@ -222,7 +223,7 @@ impl Recording {
     }
 }
 
-fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: &Sample) -> Row {
+fn row(stage: &Stage, per_gap: &Matrix3<f64>, movement: usize, sequence: u32, s: &Sample) -> Row {
     let gaps = s
         .capacitive
         .map(|code| f64::from(code) * stage.capacitive.m_per_count);
@@ -232,7 +233,7 @@ fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: 
         t_us: s.t_us,
         frame: s.codes(sequence).into(),
         signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
-        vertical: vertical_pose(plane, gaps).to_array(),
+        vertical: (per_gap * Vector3::from(gaps)).into(),
         reference: [
             x,
             (y1 + y2) / 2.0,

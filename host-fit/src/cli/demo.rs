@@ -61,7 +61,7 @@ const TABLE_8: [[f64; 2]; 3] = [[1.3919, 6.6368], [1.5381, 5.9375], [2.3057, 9.6
 fn table_7() -> BTreeMap<String, f64> {
     let theta = [0.0145f64, 0.4143, -0.0561].map(f64::to_radians);
     let places_m = [[0.1944, 0.3381], [-0.2173, 0.3555], [0.1979, 0.3293]];
-    let arms = ProbeGeometry::of_places(places_m, theta).lever_arm_m;
+    let arms = ProbeGeometry::from_places(places_m, theta).lever_arm_m;
     let eta = [0.8671, 0.7049, 0.8632];
     let a = [-188.1873, -156.5783, -178.1902];
     let b = [-69.7432, -56.7511, -63.4133];

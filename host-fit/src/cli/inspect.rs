@@ -12,6 +12,7 @@ use crate::report::table::{as_text, tables};
 use clap::Args;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::field::posterior::warmth_errors;
+use runtime::matrix::to_rows;
 use runtime::{ModelKind, ParameterSet};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -92,11 +93,11 @@ fn figures(set: &ParameterSet) -> Value {
             "errors": errors(set.fit.rms, set.fit.peak),
         },
         "parameters": parameters_in(set),
-        "plane_matrix": set.plane,
-        "plane_matrix_inverse": set.plane_inverse,
+        "plane_matrix": to_rows(&set.plane),
+        "plane_matrix_inverse": to_rows(&set.plane_inverse),
         "hall_m_per_count": set.hall.m_per_code,
         "capacitive_m_per_count": set.capacitive.m_per_code,
-        "capacitive_plane_matrix": set.capacitive.vertical_per_m,
+        "capacitive_plane_matrix": to_rows(&set.capacitive.vertical_per_m),
         "planar_per_code": c.planar_per_code,
         "vertical_per_code": c.vertical_per_code,
         "calibrated_range": {

@@ -255,9 +255,10 @@ impl<T: Real> Tangent<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::inverse_rows;
+    use crate::matrix::{from_rows, inverse};
     use crate::model::{LinearModel, Probes};
     use crate::sample;
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     /// s = phi (u + E V + p(u, w, z)) with p written as its monomials.
@@ -301,11 +302,11 @@ mod tests {
             .constants()
             .expect("a sound stage")
             .planar_per_code;
-        let plane = inverse_rows(&rows).expect("a sound stage");
+        let plane = inverse(&from_rows(&rows)).expect("a sound stage");
         let Probes::Field(probes) = calibration.probes else {
             panic!("another model")
         };
-        let u = plane.map(|row| dot(&row, q));
+        let u: [f64; 3] = (plane * Vector3::from(q)).into();
         let s = [0, 1, 2].map(|k| signal(&probes[k], u[k], dot(&probes[k].lateral, u), &vertical));
         let zero = PlanarPose::ZERO;
         let (phi, back) = FieldModel::planar_pose(&probes, &rows, s, [0.0; 3], &vertical, &zero);

@@ -14,9 +14,10 @@
 //! and eta = 1 gives (12). So one function decodes them all, and in service, where delta is
 //! zero or what a re-zero measured, the models differ only in their constants.
 
-use super::{Model, dot, dot_less, with_gain};
+use super::{Model, dot_less, with_gain};
 use crate::pose::{PlanarPose, VerticalPose};
-use crate::real::{Number, Real};
+use crate::real::Real;
+use nalgebra::{Matrix3, Vector3};
 
 /// Models (12), (15), (30) and (31): phi is linear in the vertical pose (equation 33), and
 /// the pose is linear in signal / phi.
@@ -58,7 +59,7 @@ pub struct Sensitivity<T> {
     pub per_ry_rad: T,
 }
 
-impl<T: Number> Sensitivity<T> {
+impl<T: Real> Sensitivity<T> {
     /// A sensitivity that does not depend on the vertical pose (Models (15), (30)).
     pub const fn constant(eta: T) -> Self {
         Self {
@@ -68,9 +69,7 @@ impl<T: Number> Sensitivity<T> {
             per_ry_rad: T::ZERO,
         }
     }
-}
 
-impl<T: Real> Sensitivity<T> {
     /// Each coefficient as another type of number, rounded to the nearest.
     #[must_use]
     pub fn rounded<U: Real>(&self) -> Sensitivity<U> {
@@ -86,7 +85,7 @@ impl<T: Real> Sensitivity<T> {
 
 /// phi: sensitivity of one probe at a vertical pose (equation 33).
 #[inline(always)]
-pub fn sensitivity_at<T: Number>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
+pub fn sensitivity_at<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
     ((probe.eta + probe.per_z_m * vertical.z_m) + probe.per_rx_rad * vertical.rx_rad)
         + probe.per_ry_rad * vertical.ry_rad
 }
@@ -96,7 +95,7 @@ pub fn sensitivity_at<T: Number>(probe: &Sensitivity<T>, vertical: &VerticalPose
 ///
 /// `zero` is the zero deviation as a pose, PM^-1 (delta / eta); see [`zero_pose`].
 #[inline(always)]
-pub fn planar_pose<T: Number>(
+pub fn planar_pose<T: Real>(
     pose_rows: &[[T; 3]; 3],
     signal: [T; 3],
     phi: [T; 3],
@@ -112,50 +111,47 @@ pub fn planar_pose<T: Number>(
 
 /// The zero deviation `delta_m` of the probes as a pose: PM^-1 (delta / eta), the last
 /// term of equation 31.
-pub fn zero_pose<T: Number>(
-    plane_inverse_rows: &[[T; 3]; 3],
+pub fn zero_pose<T: Real>(
+    plane_inverse: &Matrix3<T>,
     eta: [T; 3],
     delta_m: [T; 3],
 ) -> PlanarPose<T> {
-    planar_pose(plane_inverse_rows, delta_m, eta, &PlanarPose::ZERO)
+    let ratio = Vector3::from(delta_m).component_div(&Vector3::from(eta));
+    PlanarPose::from_array((plane_inverse * ratio).into())
 }
 
 /// The zero deviation delta = eta * (PM o), in m at each probe, of a pose offset o:
 /// the inverse of [`zero_pose`].
-pub fn zero_deviation_m<T: Number>(
-    plane_rows: &[[T; 3]; 3],
+pub fn zero_deviation_m<T: Real>(
+    plane: &Matrix3<T>,
     eta: [T; 3],
     offset: &PlanarPose<T>,
 ) -> [T; 3] {
-    let offset = offset.to_array();
-    [
-        eta[0] * dot(&plane_rows[0], offset),
-        eta[1] * dot(&plane_rows[1], offset),
-        eta[2] * dot(&plane_rows[2], offset),
-    ]
+    let read = plane * Vector3::from(offset.to_array());
+    Vector3::from(eta).component_mul(&read).into()
 }
 
 /// The forward model: the displacement that each probe reads at a pose, in m,
 /// s = phi(v) (PM q + delta / eta). The inverse of Model (31).
-pub fn probe_displacement_m<T: Number>(
-    plane_rows: &[[T; 3]; 3],
+pub fn probe_displacement_m<T: Real>(
+    plane: &Matrix3<T>,
     sensitivity: &[Sensitivity<T>; 3],
     planar: &PlanarPose<T>,
     vertical: &VerticalPose<T>,
     delta_m: [T; 3],
 ) -> [T; 3] {
-    let pose = planar.to_array();
-    let read = |k: usize| {
+    let moved = plane * Vector3::from(planar.to_array());
+    [0, 1, 2].map(|k| {
         let probe = &sensitivity[k];
-        sensitivity_at(probe, vertical) * (dot(&plane_rows[k], pose) + delta_m[k] / probe.eta)
-    };
-    [read(0), read(1), read(2)]
+        sensitivity_at(probe, vertical) * (moved[k] + delta_m[k] / probe.eta)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{ProbeGeometry, inverse_rows};
+    use crate::geometry::ProbeGeometry;
+    use crate::matrix::{from_rows, inverse, to_rows};
     use proptest::prelude::*;
 
     fn probe(eta: f64, a: f64, b: f64, c: f64) -> Sensitivity<f64> {
@@ -177,14 +173,14 @@ mod tests {
             t in prop::array::uniform3(-0.14..0.14f64),
         ) {
             let geometry = ProbeGeometry { lever_arm_m: [0.19, -0.21, -0.34], misalignment_rad: t };
-            let plane = geometry.plane_rows();
-            let inverse = inverse_rows(&plane).expect("sound");
+            let plane = geometry.plane();
+            let inverse = inverse(&plane).expect("sound");
             let probes = [probe(0.87, -190.0, -70.0, 15.0), probe(0.70, -160.0, -57.0, -55.0), probe(0.86, -180.0, -63.0, 13.0)];
             let vertical = VerticalPose::from_array(v);
             let s = probe_displacement_m(&plane, &probes, &PlanarPose::from_array(q), &vertical, delta);
             let phi = [0, 1, 2].map(|k| sensitivity_at(&probes[k], &vertical));
             let zero = zero_pose(&inverse, probes.map(|p| p.eta), delta);
-            let back = planar_pose(&inverse, s, phi, &zero).to_array();
+            let back = planar_pose(&to_rows(&inverse), s, phi, &zero).to_array();
             for (have, want) in back.iter().zip(q) { prop_assert!((have - want).abs() < 1e-16); }
             let deviation = zero_deviation_m(&plane, probes.map(|p| p.eta), &zero);
             for (have, want) in deviation.iter().zip(delta) { prop_assert!((have - want).abs() < 1e-18); }
@@ -194,8 +190,8 @@ mod tests {
     /// Worked by hand: aligned probes, arms 0.2, -0.2, -0.4 m, eta 1/2, a Z = 1/2 on probe A.
     #[test]
     fn model_31_gives_a_pose_worked_by_hand() {
-        let plane = [[0.0, 1.0, 0.2], [0.0, 1.0, -0.2], [1.0, 0.0, -0.4]];
-        let inverse = inverse_rows(&plane).expect("sound");
+        let plane = from_rows(&[[0.0, 1.0, 0.2], [0.0, 1.0, -0.2], [1.0, 0.0, -0.4]]);
+        let inverse = inverse(&plane).expect("sound");
         let vertical = VerticalPose {
             z_m: 2.5e-4,
             rx_rad: 0.0,
@@ -206,7 +202,7 @@ mod tests {
         // A reads 40 um at phi 1, B 10 um at phi 1/2 (20 um), C 5 um at phi 1/2 (10 um):
         // Rz = (40 - 20) um / 0.4 m = 50 urad, Y = 30 um, X = 10 um + 0.4 m * 50 urad = 30 um.
         let pose = planar_pose::<f64>(
-            &inverse,
+            &to_rows(&inverse),
             [40e-6, 10e-6, 5e-6],
             [1.0, 0.5, 0.5],
             &PlanarPose::ZERO,

@@ -56,7 +56,7 @@ fn write_all(arguments: &[PathBuf]) -> Result<bool, Box<dyn Error>> {
     )?;
     write(
         "singular.bin",
-        &changed(&|set| set.plane[1] = set.plane[0])?,
+        &changed(&|set| set.plane.set_row(1, &set.plane.row(0).into_owned()))?,
     )?;
     Ok(true)
 }

@@ -3,7 +3,7 @@
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::probe::Probe;
 use nalgebra::{Matrix3, Vector3};
-use runtime::capacitive::vertical_rows;
+use runtime::capacitive::vertical_per_gap;
 
 /// Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
 pub(super) const CHANNELS: [&str; 9] = [
@@ -35,11 +35,11 @@ impl Slopes {
     pub(super) fn new(stage: &Stage, probes: [Probe; 3]) -> Self {
         let turn = 1.0 / stage.y_baseline_m;
         // A checked stage has its sensors apart.
-        let rows = vertical_rows(&stage.capacitive_probes_m).unwrap_or_default();
+        let per_gap = vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default();
         Self {
             probes,
             by_beam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, turn, -turn),
-            by_gap: Matrix3::from_fn(|axis, gap| 1e-3 * rows[axis][gap]),
+            by_gap: per_gap * 1e-3,
         }
     }
 

@@ -9,7 +9,7 @@ use hallstage_solver::problem::Problem;
 use hallstage_solver::problem::model::{GAIN_TERMS, Model, ParameterId};
 use hallstage_solver::problem::parameters::{Parameters, THETA, search_box};
 use hallstage_solver::problem::terms::Motion;
-use runtime::model::dot;
+use nalgebra::Vector3;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a
 /// million samples of noise alone span ten times its standard deviation.
@@ -140,10 +140,12 @@ pub fn check_motion(
             });
         }
     }
-    let plane = Parameters::designed(stage).geometry().plane_rows();
+    let plane = Parameters::designed(stage).geometry().plane();
     for (k, probe) in ["A", "B", "C"].into_iter().enumerate() {
         let (span, noise) = span_and_noise(dataset, true, |row| row.signal_m[k]);
-        let (moved, _) = span_and_noise(dataset, true, |row| dot(&plane[k], row.reference));
+        let (moved, _) = span_and_noise(dataset, true, |row| {
+            (plane * Vector3::from(row.reference))[k]
+        });
         if stands_still(span, noise) && moved > SPAN_OF_MOTION {
             return Err(FitFailure::DeadProbe {
                 probe,

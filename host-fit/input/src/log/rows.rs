@@ -7,7 +7,8 @@ use super::record::Record;
 use super::time::Clock;
 use crate::dataset::{LoggedFrame, Row};
 use crate::stage::{CodeScale, Stage};
-use runtime::capacitive::{vertical_pose, vertical_rows};
+use nalgebra::{Matrix3, Vector3};
+use runtime::capacitive::vertical_per_gap;
 use runtime::frame::MISSING_CODE;
 use runtime::{RawFrame, VerticalPose};
 
@@ -30,7 +31,7 @@ pub(super) struct RowReader<'a> {
     pub(super) columns: Columns,
     hall: &'a CodeScale,
     capacitive: &'a CodeScale,
-    vertical_rows: [[f64; 3]; 3],
+    vertical_per_gap: Matrix3<f64>,
     y_baseline_m: f64,
     displacement_max_m: f64,
     height_max_m: f64,
@@ -59,7 +60,7 @@ impl<'a> RowReader<'a> {
             hall: &stage.hall,
             capacitive: &stage.capacitive,
             // A checked stage has its sensors in a triangle.
-            vertical_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
+            vertical_per_gap: vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default(),
             y_baseline_m: stage.y_baseline_m,
             displacement_max_m: displacement_max_m(stage),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
@@ -105,15 +106,15 @@ impl<'a> RowReader<'a> {
         let mut capacitive = [0; 3];
         let height = |source| scaled(row, source, self.height_max_m, "m");
         let rotation = |source| scaled(row, source, ROTATION_MAX_RAD, "rad");
-        let of_gaps = |gaps_m| vertical_pose(&self.vertical_rows, gaps_m).to_array();
+        let vertical_per_gap = self.vertical_per_gap;
+        let from_gaps = |gaps_m| (vertical_per_gap * Vector3::from(gaps_m)).into();
         let vertical = match set {
             Quantity::VERTICAL => [height(a)?, rotation(b)?, rotation(c)?],
-            Quantity::GAP_LENGTHS => of_gaps([height(a)?, height(b)?, height(c)?]),
+            Quantity::GAP_LENGTHS => from_gaps([height(a)?, height(b)?, height(c)?]),
             _ => {
                 capacitive = self.codes(row, [a, b, c], self.capacitive)?;
                 let m_per_count = self.capacitive.m_per_count;
-                let gaps_m = capacitive.map(|code| f64::from(code) * m_per_count);
-                vertical_pose(&self.vertical_rows, gaps_m).to_array()
+                from_gaps(capacitive.map(|code| f64::from(code) * m_per_count))
             }
         };
         let codes = RawFrame::new(hall, capacitive, 0, t_us as u32);

@@ -7,9 +7,11 @@ use super::document::{Document, List};
 use super::error::StageError;
 use super::{CodeScale, Probe, Stage, columns, motion, paper_signs, search, temperature};
 use crate::source;
-use runtime::capacitive::{ProbePositions, vertical_rows};
+use nalgebra::Matrix3;
+use runtime::capacitive::{ProbePositions, vertical_per_gap};
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
-use runtime::geometry::{ProbeGeometry, inverse_and_determinant};
+use runtime::geometry::ProbeGeometry;
+use runtime::matrix::inverse_and_determinant;
 use std::f64::consts::TAU;
 use std::path::Path;
 use toml::Spanned;
@@ -98,8 +100,8 @@ fn designed_probes(document: &Document<'_>) -> Result<[Probe; 3], StageError> {
             *theta = (direction - STANDARD_DEG[k]).to_radians();
         }
     }
-    let rows = ProbeGeometry::of_places(places_m, theta_rad).plane_rows();
-    if inverse_and_determinant(&rows).1.abs() < SPACING_MIN_M {
+    let plane = ProbeGeometry::from_places(places_m, theta_rad).plane();
+    if inverse_and_determinant(&plane).1.abs() < SPACING_MIN_M {
         let problem = "the probes cannot tell X, Y and Rz apart: A (+h1x_m) and B (-h2x_m) stand at \
                        the same x, or two probes sense the same motion; correct place or direction";
         return Err(document.refuse(document.span("hall", "h2x_m"), problem));
@@ -193,9 +195,9 @@ fn capacitive_probes(
     }
     let code = scale.window.low.abs().max(scale.window.high.abs());
     let full_scale_m = scale.m_per_count * f64::from(code);
-    let rotation_rad = |row: [f64; 3]| row.iter().map(|x| x.abs()).sum::<f64>() * full_scale_m;
-    let [_, rx, ry] = vertical_rows(&probes).unwrap_or([[f64::INFINITY; 3]; 3]);
-    let largest_rad = rotation_rad(rx).max(rotation_rad(ry));
+    let per_gap = vertical_per_gap(&probes).unwrap_or(Matrix3::repeat(f64::INFINITY));
+    let rotation_rad = |axis| per_gap.row(axis).abs().sum() * full_scale_m;
+    let largest_rad = rotation_rad(1).max(rotation_rad(2));
     if largest_rad > TAU {
         let problem = format!(
             "the sensors stand so near each other that codes of {full_scale_m:e} m mean a rotation \

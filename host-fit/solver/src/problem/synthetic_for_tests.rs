@@ -48,7 +48,7 @@ impl Protocol {
     /// The log, as the fit sees it: signals are not rounded to codes, while the frames are.
     pub fn dataset(&self, stage: &Stage) -> Dataset {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let plane = self.truth.geometry().plane_rows();
+        let plane = self.truth.geometry().plane();
         let mut dataset = Dataset::default();
         for (setting, axis) in self
             .settings

@@ -6,7 +6,7 @@
 use crate::problem::parameters::Parameters;
 use hallstage_input::stage::Range;
 use runtime::PlanarPose;
-use runtime::geometry::inverse_rows;
+use runtime::matrix::inverse;
 use runtime::model::{zero_deviation_m, zero_pose};
 
 /// The zero deviation of one movement.
@@ -30,7 +30,7 @@ impl ZeroDeviation {
 
     /// The zero deviation that takes off a mean pose error (m, m, rad).
     pub fn of_mean_error(parameters: &Parameters, mean_error: [f64; 3], range: &Range) -> Self {
-        let plane = parameters.geometry().plane_rows();
+        let plane = parameters.geometry().plane();
         let pose = PlanarPose::from_array(mean_error);
         let delta_m = zero_deviation_m(&plane, parameters.eta(), &pose);
         Self {
@@ -42,7 +42,7 @@ impl ZeroDeviation {
 
     /// A zero deviation that is known, m at the probes.
     pub fn given(parameters: &Parameters, delta_m: [f64; 3]) -> Self {
-        let pose = inverse_rows(&parameters.geometry().plane_rows()).map_or([0.0; 3], |inverse| {
+        let pose = inverse(&parameters.geometry().plane()).map_or([0.0; 3], |inverse| {
             zero_pose(&inverse, parameters.eta(), delta_m).to_array()
         });
         Self {

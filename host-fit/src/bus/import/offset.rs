@@ -15,6 +15,7 @@ use super::reference::{Reference, Sample};
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::clocks::{Alignment, Lag};
+use nalgebra::Matrix3;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::Row;
 use serde::Serialize;
@@ -89,7 +90,7 @@ pub(super) struct Records<'r> {
     /// Whether the reference has beams.
     is_beams: bool,
     /// What the designed probes read of X, Y, Rz.
-    plane: [[f64; 3]; 3],
+    plane: Matrix3<f64>,
 }
 
 /// Ticks of the correlation, and of a fit, at most.
@@ -139,7 +140,7 @@ impl<'r> Records<'r> {
             scale: reference.quantities.map(|q| stage.log.column(q).scale),
             stage,
             is_beams: reference.quantities == Quantity::BEAMS,
-            plane: stage.geometry().plane_rows(),
+            plane: stage.geometry().plane(),
         }
     }
 

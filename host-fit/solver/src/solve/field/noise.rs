@@ -8,7 +8,7 @@ use crate::solve::robust::HALF;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::SecondDifferences;
 use nalgebra::DMatrix;
-use runtime::geometry::inverse_rows;
+use runtime::matrix::{from_rows, inverse, to_rows};
 
 /// Length over which the reference's walk is averaged, s.
 const SPAN_S: f64 = 1.0;
@@ -156,10 +156,10 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
         by_unknown: [[0.0; UNKNOWNS]; 3],
     };
     for block in blocks {
-        let inverse = inverse_rows(&block.by_pose)?;
+        let by_probe = to_rows(&inverse(&from_rows(&block.by_pose))?);
         sum.rows += block.rows;
         sum.time_s += block.rows * block.time_s;
-        for (axis, row) in inverse.iter().enumerate() {
+        for (axis, row) in by_probe.iter().enumerate() {
             for (probe, per_mm) in row.iter().enumerate() {
                 let weight = per_mm * block.rows;
                 let white = per_mm * white_mm[probe];

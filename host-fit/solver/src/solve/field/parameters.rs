@@ -7,9 +7,10 @@ use super::whiten::{UNKNOWNS, WARMTH};
 use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::Unknowns;
 use hallstage_input::stage::Stage;
-use nalgebra::{DMatrix, DVector};
-use runtime::geometry::{ProbeGeometry, SensingAxes, inverse_rows};
-use runtime::model::{FieldModel, FieldProbe, Model, Probes, Sensitivity, dot};
+use nalgebra::{DMatrix, DVector, Matrix3};
+use runtime::geometry::{ProbeGeometry, SensingAxes};
+use runtime::matrix::{from_rows, inverse, to_rows};
+use runtime::model::{FieldModel, FieldProbe, Model, Probes, Sensitivity};
 use runtime::{ParameterSet, PlanarPose, VerticalPose};
 
 /// A calibration by the field model.
@@ -113,22 +114,21 @@ impl FieldParameters {
     }
 
     /// The lateral rows W: displacement across each probe's axis per (m, m, rad) of (X, Y, Rz).
-    pub fn lateral_rows(&self) -> [[f64; 3]; 3] {
+    pub fn lateral(&self) -> Matrix3<f64> {
         let axes = self.axes();
-        [0, 1, 2].map(|k| {
+        from_rows(&[0, 1, 2].map(|k| {
             let p = &self.probes[k];
             let (along, across) = (axes.0[k], axes.across()[k]);
             let [x, y] = place(p, self.places[k]).0;
             [across[0], across[1], along[0] * x + along[1] * y]
-        })
+        }))
     }
 
     /// The decoder's constants for signals in units of `m_per_unit`: m for signals in m, m per
     /// code for codes. `None` where PM is singular.
     pub fn constants(&self, m_per_unit: f64) -> Option<FieldConstants> {
-        let inverse = inverse_rows(&self.geometry().plane_rows())?;
-        let column = |k: usize| [inverse[0][k], inverse[1][k], inverse[2][k]];
-        let lateral = self.lateral_rows();
+        let plane_inverse = inverse(&self.geometry().plane())?;
+        let lateral = to_rows(&(self.lateral() * plane_inverse));
         let probe = |k: usize| {
             let values = &self.probes[k];
             let scale = shape_scale(values[ETA], m_per_unit);
@@ -137,12 +137,12 @@ impl FieldParameters {
                 sensitivity: sensitivity(values),
                 carry: [0, 1, 2].map(|j| values[CARRY + j] / m_per_unit),
                 shape: shape(scaled),
-                lateral: [0, 1, 2].map(|j| dot(&lateral[k], column(j))),
+                lateral: lateral[k],
             }
         };
         Some(FieldConstants {
             probes: [probe(0), probe(1), probe(2)],
-            pose_rows: inverse.map(|row| row.map(|x| x * m_per_unit)),
+            pose_rows: to_rows(&(plane_inverse * m_per_unit)),
         })
     }
 }

@@ -6,7 +6,7 @@ use super::terms::{CARRY, COUNT, PER_PROBE, name};
 use super::whiten::Noise;
 use crate::problem::model;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
-use runtime::geometry::inverse_rows;
+use runtime::matrix::{from_rows, inverse, to_rows};
 
 /// Error of a probe's reading in service by the form of the model, rms, mm: mean over simulated stages,
 /// each fitted to 30 s without noise and drift; 16 to 46 nm.
@@ -57,8 +57,7 @@ impl PoseErrors {
     pub(super) fn new(probes: &[Probe; 3], planar: [f64; 3], vertical: [f64; 3]) -> Option<Self> {
         let planar_mm = planar.map(|x| x * 1e3);
         let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
-        let inverse = inverse_rows(&read.map(|r| r.by_pose))?;
-        let by_signal = inverse.map(|row| row.map(|x| 1e-3 * x));
+        let by_signal = to_rows(&(inverse(&from_rows(&read.map(|r| r.by_pose)))? * 1e-3));
         let by_parameter = by_signal.map(|row| {
             std::array::from_fn(|k| {
                 let probe = k / PER_PROBE;

@@ -181,6 +181,7 @@ mod tests {
     use super::*;
     use crate::solve::field::sample_for_tests::parameters;
     use crate::solve::field::terms::TERMS;
+    use runtime::matrix::to_rows;
 
     const PLANAR_MM: [f64; 3] = [0.31, -0.42, 0.23];
     const VERTICAL: [f64; 3] = [180e-6, -390e-6, 270e-6];
@@ -188,8 +189,8 @@ mod tests {
     #[test]
     fn a_probe_reads_what_the_formula_says() {
         let parameters = parameters();
-        let lateral = parameters.lateral_rows();
-        let plane = parameters.model_31().geometry().plane_rows();
+        let lateral = to_rows(&parameters.lateral());
+        let plane = to_rows(&parameters.model_31().geometry().plane());
         for (k, probe) in probes(&parameters).iter().enumerate() {
             let values = &parameters.probes[k];
             let along = |row: &[f64; 3]| (0..3).map(|j| row[j] * PLANAR_MM[j]).sum::<f64>();

@@ -4,7 +4,8 @@
 use crate::problem::parameters::Parameters;
 use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
-use runtime::geometry::{SensingAxes, inverse_rows};
+use runtime::geometry::SensingAxes;
+use runtime::matrix::{inverse, to_rows};
 
 /// The point (G, r) of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,14 +18,14 @@ pub struct Point {
 
 /// The point (G, r) of a set of parameters, or `None` where PM is singular or an eta is zero.
 pub fn point_of(p: &Parameters) -> Option<Point> {
-    let inverse = inverse_rows(&p.geometry().plane_rows())?;
+    let inverse = inverse(&p.geometry().plane())?;
     let eta = p.eta();
     if eta.iter().any(|eta| !eta.is_normal()) {
         return None;
     }
     let slopes = p.slopes();
     Some(Point {
-        gain: Matrix3::from_fn(|i, j| inverse[i][j] / eta[j]),
+        gain: Matrix3::from_fn(|i, j| inverse[(i, j)] / eta[j]),
         ratios: [0, 1, 2].map(|probe| slopes[probe].map(|slope| slope / eta[probe])),
     })
 }
@@ -33,8 +34,7 @@ pub fn point_of(p: &Parameters) -> Option<Point> {
 /// arm of each probe. `None` where G is singular. Each theta comes out within a quarter turn of the
 /// designed one.
 pub fn parameters_of(point: &Point, stage: &Stage) -> Option<Parameters> {
-    let rows: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| point.gain[(i, j)]));
-    let m = inverse_rows(&rows)?;
+    let m = to_rows(&inverse(&point.gain)?);
     let mut geometry = stage.geometry();
     let mut eta = [1.0; 3];
     let designed = SensingAxes::at(geometry.misalignment_rad);

@@ -8,7 +8,9 @@ use crate::problem::model::COUNT;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA};
 use crate::problem::{Problem, TrainRow};
 use crate::solve::gauss_newton::{Equations, Normal, Point};
-use runtime::geometry::{SensingAxes, inverse_rows};
+use nalgebra::{Matrix3, Vector3};
+use runtime::geometry::SensingAxes;
+use runtime::matrix::inverse;
 
 /// Columns: the parameters, one left free, the residual.
 pub const COLUMNS: usize = COUNT + 2;
@@ -19,7 +21,7 @@ pub const SHARE_MIN: f64 = 0.05;
 /// A model of the paper, ready to decode rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Decoder {
-    inverse: [[f64; 3]; 3],
+    inverse: Matrix3<f64>,
     across: [[f64; 2]; 3],
     eta: [f64; 3],
     slopes: [[f64; 3]; 3],
@@ -43,7 +45,7 @@ impl Decoder {
         let eta = parameters.eta();
         let is_regular = eta.iter().all(|eta| eta.is_normal());
         is_regular.then_some(Self {
-            inverse: inverse_rows(&geometry.plane_rows())?,
+            inverse: inverse(&geometry.plane())?,
             across: SensingAxes::at(geometry.misalignment_rad).across(),
             eta,
             slopes: parameters.slopes(),
@@ -61,11 +63,8 @@ impl Decoder {
             return None;
         }
         let along_um = [0, 1, 2].map(|k| row.signal_um[k] / phi[k]);
-        let planar = self
-            .inverse
-            .map(|row| (row[0] * along_um[0] + row[1] * along_um[1]) + row[2] * along_um[2]);
         Some(Pose {
-            planar,
+            planar: (self.inverse * Vector3::from(along_um)).into(),
             phi,
             along_um,
         })
@@ -91,7 +90,7 @@ impl Decoder {
             let [x, y] = self.across[probe];
             let per_phi = along_um[probe] / phi[probe];
             for (axis, column) in columns.iter_mut().enumerate() {
-                let to_pose = -self.weights[axis] * self.inverse[axis][probe];
+                let to_pose = -self.weights[axis] * self.inverse[(axis, probe)];
                 column[probe] = to_pose * planar[2];
                 column[THETA + probe] = to_pose * (x * planar[0] + y * planar[1]);
                 column[ETA + probe] = to_pose * per_phi;

@@ -108,7 +108,7 @@ impl<'a> Objective<'a> {
                 values[THETA..][..fitted].copy_from_slice(&individual[6..][..fitted]);
                 let pairs = [0, 2, 4].map(|k| [individual[k], individual[k + 1]]);
                 let theta = parameters.geometry().misalignment_rad;
-                ProbeGeometry::of_places(paper_signs(pairs), theta).lever_arm_m
+                ProbeGeometry::from_places(paper_signs(pairs), theta).lever_arm_m
             }
             Projection::Delta => {
                 values[THETA..][..fitted].copy_from_slice(&individual[THETA..][..fitted]);

@@ -9,14 +9,14 @@ use crate::problem::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
 use crate::solve::least_squares::gains::Point;
 use nalgebra::{Matrix3, Vector3};
-use runtime::geometry::inverse_rows;
+use runtime::matrix::{from_rows, inverse};
 
 /// The slopes over eta of A, B, C.
 struct Ratios(Matrix3<f64>);
 
 impl Ratios {
     fn new(ratios: &[[f64; 3]; 3]) -> Self {
-        Self(matrix(ratios))
+        Self(from_rows(ratios))
     }
 
     /// phi / eta of the three probes at a row (equation 33), and s' there, um.
@@ -56,8 +56,8 @@ pub fn with_best_delta(
 ) -> Option<Vector3<f64>> {
     let ratios = Ratios::new(&point.ratios);
     let range = problem.stage.search.delta_m;
-    let rows = matrix(&parameters.geometry().plane_rows());
-    let to_delta = Matrix3::from_diagonal(&Vector3::from(parameters.eta())) * rows;
+    let eta = Matrix3::from_diagonal(&Vector3::from(parameters.eta()));
+    let to_delta = eta * parameters.geometry().plane();
     let mut smallest = Vector3::repeat(f64::INFINITY);
     let mut squares = Vector3::zeros();
     for group in &problem.groups {
@@ -115,13 +115,8 @@ pub fn best_gain(
     if smallest.min() <= SHARE_MIN {
         return None;
     }
-    let rows = std::array::from_fn(|i| std::array::from_fn(|k| signal[(i, k)]));
-    let gain = mixed.tr_mul(&matrix(&inverse_rows(&rows)?));
+    let gain = mixed.tr_mul(&inverse(&signal)?);
     let left = squares - (gain * mixed).diagonal();
     // Rounding could make an exact fit negative.
     Some((gain, left.map(|left| left.max(0.0))))
-}
-/// A matrix from its rows.
-fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
-    Matrix3::from(*rows).transpose()
 }

@@ -7,7 +7,9 @@ use crate::problem::{Problem, TrainRow};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped;
 use hallstage_input::stage::{Range, Stage};
-use runtime::geometry::{ProbeGeometry, inverse_rows};
+use nalgebra::Matrix3;
+use runtime::geometry::ProbeGeometry;
+use runtime::matrix::{inverse, to_rows};
 use runtime::model::{Sensitivity, planar_pose, sensitivity_at, zero_pose};
 use runtime::{ModelKind, PlanarPose, VerticalPose};
 
@@ -83,12 +85,12 @@ pub fn phi(parameters: &Parameters, row: &TrainRow) -> [f64; 3] {
 /// X, Y, Rz of a row by the runtime's own model in f64.
 pub fn pose_by_the_runtime(
     parameters: &Parameters,
-    inverse: &[[f64; 3]; 3],
+    plane_inverse: &Matrix3<f64>,
     row: &TrainRow,
     zero: &PlanarPose<f64>,
 ) -> [f64; 3] {
     let signal = row.signal_um.map(|s| s * 1e-6);
-    planar_pose(inverse, signal, phi(parameters, row), zero).to_array()
+    planar_pose(&to_rows(plane_inverse), signal, phi(parameters, row), zero).to_array()
 }
 
 /// The fitness by the runtime's own model in f64, row by row.
@@ -97,7 +99,7 @@ pub fn fitness_by_the_runtime(
     parameters: &Parameters,
     delta_m: &[[f64; 3]],
 ) -> f64 {
-    let Some(inverse) = inverse_rows(&parameters.geometry().plane_rows()) else {
+    let Some(inverse) = inverse(&parameters.geometry().plane()) else {
         return f64::NAN;
     };
     let mut cost = 0.0;

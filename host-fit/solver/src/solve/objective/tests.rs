@@ -13,7 +13,7 @@ use crate::solve::Projection;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use hallstage_input::stage::Range;
-use runtime::geometry::inverse_rows;
+use runtime::matrix::inverse;
 use runtime::{ModelKind, PlanarPose};
 
 const MODELS: [ModelKind; 4] = [
@@ -43,7 +43,7 @@ fn assert_close(have: f64, want: f64, relative: f64, what: &str) {
 
 /// The mean pose error of each movement by the runtime's model, and so its zero deviation.
 fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDeviation> {
-    let inverse = inverse_rows(&parameters.geometry().plane_rows()).expect("sound");
+    let inverse = inverse(&parameters.geometry().plane()).expect("sound");
     let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
     for group in &problem.groups {
         let rows = &problem.rows[group.rows.clone()];

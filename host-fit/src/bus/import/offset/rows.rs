@@ -5,8 +5,8 @@ use crate::bus::import::ImportError;
 use crate::bus::import::join::{At, at};
 use crate::bus::import::node_clock::Tick;
 use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
-use runtime::capacitive::{vertical_pose, vertical_rows};
-use runtime::model::dot;
+use nalgebra::Vector3;
+use runtime::capacitive::vertical_per_gap;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,7 @@ impl Records<'_> {
         let hall_mm = self.stage.hall.m_per_count * 1e3;
         let gap_m = self.stage.capacitive.m_per_count;
         // A checked stage has its sensors in a triangle.
-        let vertical = vertical_rows(&self.stage.capacitive_probes_m).unwrap_or_default();
+        let per_gap = vertical_per_gap(&self.stage.capacitive_probes_m).unwrap_or_default();
         let mut used = Vec::with_capacity(rows.len());
         let mut movements = Vec::new();
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
@@ -37,14 +37,10 @@ impl Records<'_> {
                     warmth_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
                     signal_mm: row.tick.codes.hall.map(|code| hall_mm * f64::from(code)),
-                    vertical: vertical_pose(
-                        &vertical,
-                        row.tick
-                            .codes
-                            .capacitive
-                            .map(|code| gap_m * f64::from(code)),
-                    )
-                    .to_array(),
+                    vertical: (per_gap
+                        * Vector3::from(row.tick.codes.capacitive)
+                            .map(|code| gap_m * f64::from(code)))
+                    .into(),
                     reference_mm: row.pose.map(|q| q * 1e3),
                     rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
                     weight: 1.0,
@@ -97,10 +93,8 @@ impl Records<'_> {
             for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
                 let n = movement.len() as f64;
                 let pair = |row: &Row| {
-                    [
-                        f64::from(row.tick.codes.hall[k]),
-                        dot(&self.plane[k], row.pose),
-                    ]
+                    let read = self.plane * Vector3::from(row.pose);
+                    [f64::from(row.tick.codes.hall[k]), read[k]]
                 };
                 let [signal, probe] =
                     [0, 1].map(|i| movement.iter().map(|row| pair(row)[i]).sum::<f64>() / n);
