@@ -4,8 +4,9 @@
 //! cargo run -p host-fit --example fit -- host-fit/data/run30.csv.gz host-fit/data/stage.toml target/example.bin
 //! ```
 
-use host_fit::calibration::diagnose;
+use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::words::message;
 use host_fit::input::finding::Severity;
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage;
@@ -32,9 +33,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     // What the fit itself does not refuse may still be wrong: two exchanged channels, for instance.
-    let findings = diagnose::of_log(&dataset, &stage, Ok(&fit)).findings;
+    let findings = diagnose_log(&dataset, &stage, Ok(&fit)).findings;
     for finding in &findings {
-        println!("{:?}: {}", finding.severity, finding.message);
+        println!("{:?}: {}", finding.severity, message(finding));
     }
     if findings
         .iter()

@@ -3,7 +3,7 @@
 
 use crate::common::{Twin, rms};
 use crate::service;
-use host_fit::calibration::diagnose;
+use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::calibration::judge::verdict::Verdict;
 use host_fit::input::dataset::Dataset;
@@ -122,7 +122,7 @@ pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
             let at_work = at_work.dataset(stage).expect("a plane");
             let dataset = faulty.dataset(stage).expect("a plane");
             let fitted = fit(&dataset, stage, &settings);
-            let diagnosis = diagnose::of_log(&dataset, stage, fitted.as_ref());
+            let diagnosis = diagnose_log(&dataset, stage, fitted.as_ref());
             let Ok(fitted) = fitted else {
                 println!("{name:<26} no fit");
                 continue;

@@ -10,9 +10,11 @@ mod paper;
 mod signals;
 
 use common::Twin;
-use host_fit::calibration::diagnose;
+use host_fit::calibration::diagnose::diagnose_log;
+use host_fit::calibration::diagnose::structure::structure;
 use host_fit::calibration::fit::{FitError, FitSettings, ModelChoice, fit};
 use host_fit::calibration::plan::plan;
+use host_fit::calibration::words::message;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::finding::{Code, Finding, Severity};
 use host_fit::input::shipped;
@@ -37,8 +39,8 @@ fn main() {
             let mut recording = recording(&stage, &planned, 1000 + seed);
             recording.movements.iter_mut().flatten().for_each(mistake);
             let dataset = recording.dataset(&stage).expect("a plane");
-            let mut found = diagnose::structure::structure(&dataset, &stage, false).into_iter();
-            found.any(|finding| finding.code == code)
+            let mut found = structure(&dataset, &stage, false).into_iter();
+            found.any(|finding| finding.code() == code)
         });
         let named = found.filter(|is_named| *is_named).count();
         println!("{title:<36}{named:>6}/{FAULTY}");
@@ -51,7 +53,7 @@ fn main() {
 /// The findings of a log above a note, as `fit` gives them, and why there is no fit.
 fn grave(dataset: &Dataset, stage: &Stage) -> (Vec<Finding>, Option<FitError>) {
     let fitted = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
-    let mut found = diagnose::of_log(dataset, stage, fitted.as_ref()).findings;
+    let mut found = diagnose_log(dataset, stage, fitted.as_ref()).findings;
     found.retain(|finding| finding.severity > Severity::Note);
     (found, fitted.err())
 }
@@ -62,8 +64,8 @@ fn clean(stage: &Stage, planned: &Trajectory) {
     for seed in 1..=CLEAN {
         let recording = recording(stage, planned, seed);
         let (grave, error) = grave(&recording.dataset(stage).expect("a plane"), stage);
-        for Finding { code, message, .. } in &grave {
-            println!("clean stage {seed}: {code:?}: {message}");
+        for found in &grave {
+            println!("clean stage {seed}: {:?}: {}", found.code(), message(found));
         }
         if let Some(error) = &error {
             println!("clean stage {seed}: {error}");

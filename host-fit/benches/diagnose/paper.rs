@@ -3,7 +3,7 @@
 
 use crate::common::{Twin, rms};
 use crate::service;
-use host_fit::calibration::diagnose;
+use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Protocol;
@@ -24,7 +24,7 @@ pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
             let service = service(&twin).dataset(stage).expect("a plane");
             let dataset = log.dataset(stage).expect("a plane");
             let fitted = fit(&dataset, stage, &FitSettings::new(ModelChoice::Auto));
-            let diagnosis = diagnose::of_log(&dataset, stage, fitted.as_ref());
+            let diagnosis = diagnose_log(&dataset, stage, fitted.as_ref());
             let (Ok(fitted), Some(expected)) = (fitted, diagnosis.predicted) else {
                 println!("{what}: no fit of stage {seed}");
                 continue;

@@ -2,16 +2,12 @@
 //! with its channel, and how many other warnings come beside.
 
 use crate::{FAULTY, recording};
+use host_fit::input::channel::Channel;
 use host_fit::input::finding::Code;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Trajectory;
 use host_fit::simulate::recording::{Recording, Sample};
 use std::f64::consts::TAU;
-
-/// Hall A, B, C; X, Y1, Y2; the gaps.
-const CHANNELS: [&str; 9] = [
-    "hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3",
-];
 
 /// Puts a fault of this size into a recording.
 type Fault = fn(&mut Faulty, f64);
@@ -124,7 +120,7 @@ pub(crate) fn table(stage: &Stage, planned: &Trajectory) {
                 let dataset = faulty.recording.dataset(stage).expect("a plane");
                 let (found, _) = crate::grave(&dataset, stage);
                 let (right, wrong): (Vec<_>, Vec<_>) = (found.into_iter()).partition(|finding| {
-                    finding.code == code && finding.channel.as_deref() == Some(CHANNELS[channel])
+                    finding.code() == code && finding.channels() == [Channel::SINGLE[channel]]
                 });
                 named += usize::from(!right.is_empty());
                 others += wrong.len();

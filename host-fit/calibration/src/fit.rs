@@ -38,7 +38,7 @@ use field::{FirstPhase, check_near};
 pub(crate) use lag::with_beams_later;
 pub use repair::Repair;
 pub use settings::{FitSettings, ModelChoice};
-pub use warning::{of_counts, of_undecoded};
+pub use warning::{codes_refused, counted};
 use weights::{by_row, left_out, outliers};
 
 use crate::judge::identify::{check_described, check_determined, check_motion};
@@ -125,7 +125,7 @@ pub struct Fit {
 pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<Fit, FitError> {
     let mut found = lag::without_lag(dataset, stage, settings)?;
     if let Some(lag) = &found.lag {
-        let clear = warning::of_lag(lag, stage.servo_period_s);
+        let clear = warning::late_reference(lag, stage.servo_period_s);
         found.warnings.extend(clear);
     }
     Ok(found)

@@ -6,6 +6,7 @@ pub mod fit;
 pub mod judge;
 pub mod plan;
 pub mod recalibrate;
+pub mod words;
 #[cfg(test)]
 use hallstage_solver::problem;
 #[cfg(test)]

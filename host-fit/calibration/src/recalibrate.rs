@@ -28,12 +28,10 @@ mod described;
 
 use described::check_described;
 
-use crate::diagnose::bank::declared_service;
 use crate::diagnose::signals::signal_findings;
-use crate::diagnose::temperature::validity;
-use crate::diagnose::{Diagnosis, of_judged};
+use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::RANGE_MARGIN;
-use crate::judge::verdict::Predicted;
+use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
@@ -302,10 +300,11 @@ pub fn recalibrate(
     let predicted = declared_service(stage, &update.parameters, update.noise.white_mm)
         .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
     let (white_mm, covariance) = (update.noise.white_mm, &update.posterior.covariance);
-    let validity = known.and_then(|_| validity(stage, &update.parameters, white_mm, covariance));
+    let validity =
+        known.and_then(|_| Validity::new(stage, &update.parameters, white_mm, covariance));
     let diagnosis = Diagnosis {
         validity,
-        ..of_judged(dataset, stage, &set, predicted)
+        ..diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted))
     };
     let axes = judgement.errors.axes;
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);

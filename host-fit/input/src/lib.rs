@@ -16,6 +16,7 @@
 
 pub mod axis;
 mod binary;
+pub mod channel;
 pub mod dataset;
 pub mod draft;
 mod encoding;

@@ -24,14 +24,13 @@ mod stream;
 pub mod table;
 pub mod time;
 pub mod units;
-mod warning;
 
 pub use cell::CellFault;
 pub use error::{LogError, LogProblem, Place};
 pub use stream::{LogEnd, LogRow, LogRows};
 
 use crate::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
-use crate::finding::Finding;
+use crate::finding::{Finding, Kind};
 use crate::sample::Sampler;
 use crate::stage::Stage;
 use crate::text::TextReader;
@@ -253,8 +252,8 @@ fn read_texts<'t>(
     let (rows, _) = reading.dataset.read();
     let (taken, runs) = (reading.dataset.rows.len(), reading.dataset.movements.len());
     if taken < rows {
-        let sampled = warning::sampled(rows, taken, runs);
-        reading.warnings.push(sampled);
+        let excerpt = Kind::Excerpt { rows, taken, runs };
+        reading.warnings.push(Finding::new(excerpt));
     }
     Ok(reading)
 }

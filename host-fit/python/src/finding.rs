@@ -1,5 +1,6 @@
 //! Findings, and figures in general, on their way to Python: as JSON, which has a name for each.
 
+use host_fit::calibration::words::Worded;
 use host_fit::input::finding::Finding;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -15,7 +16,7 @@ pub fn figures<'py>(py: Python<'py>, figures: &impl Serialize) -> PyResult<Bound
 pub fn list<'py>(py: Python<'py>, findings: &[Finding]) -> PyResult<Bound<'py, PyList>> {
     let class = py.import("hallstage._results")?.getattr("Finding")?;
     let made = findings.iter().map(|found| {
-        let members = figures(py, found)?;
+        let members = figures(py, &Worded(found))?;
         let members = members.cast_into::<pyo3::types::PyDict>()?;
         class.call((), Some(&members))
     });

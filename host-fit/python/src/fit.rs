@@ -7,7 +7,7 @@ use crate::finding;
 use crate::log::Log;
 use crate::work;
 use host_fit::calibrate::{FitOrder, Limits, check_refusal, loss_of};
-use host_fit::calibration::diagnose;
+use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
 use host_fit::input::interrupt;
 use host_fit::solver::problem::draw::Draw;
@@ -49,7 +49,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     let (reading, stage) = (&log.reading, &log.designed);
     let (diagnosis, refusal) = work::run(py, || {
         let fitted = fit_rows(&reading.dataset, stage, &settings);
-        let diagnosis = diagnose::of_log(&reading.dataset, stage, fitted.as_ref());
+        let diagnosis = diagnose_log(&reading.dataset, stage, fitted.as_ref());
         let refusal = check_refusal(fitted.as_ref(), &diagnosis.findings);
         (diagnosis, refusal)
     })?;

@@ -2,6 +2,7 @@
 
 use crate::error::{internal, of_output, wrong};
 use crate::log::rows_of_three;
+use host_fit::calibration::words::message;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::finding::Finding;
 use host_fit::input::log::LogReading;
@@ -34,7 +35,7 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
 
 /// The same in words, for a terminal.
 pub fn text(subject: &Subject, findings: &[Finding]) -> String {
-    let messages = findings.iter().map(|found| format!("{}\n", found.message));
+    let messages = findings.iter().map(|found| message(found) + "\n");
     Summary::new(subject).as_text() + &messages.collect::<String>()
 }
 

@@ -5,12 +5,14 @@ use crate::report::errors::RowErrors;
 use crate::report::json::{Circumstances, Report, of_eval};
 use crate::report::page::Errors;
 use crate::report::verdict::{End, Subject};
-use hallstage_calibration::diagnose::{self, Diagnosis};
-use hallstage_calibration::fit::of_counts;
+use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
+use hallstage_calibration::fit::counted;
+use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::Known;
-use hallstage_input::finding::{self, Severity};
+use hallstage_calibration::words;
+use hallstage_input::finding::Severity;
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
@@ -85,15 +87,13 @@ impl Evaluation {
         let decoded = Decoded::new(set, &log.dataset);
         let of_rows = decoded.judge(&log.dataset, stage, zeros);
         let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
-        let mut diagnosis = diagnose::of_judged(&log.dataset, stage, set, None);
-        let (temperature, refitted) = (&set.constants.temperature, zeros == Zeros::Refit);
-        let rezero = diagnose::temperature::rezero(temperature, &log.dataset, refitted);
-        let findings = diagnosis.findings.into_iter().chain(rezero);
-        diagnosis.findings = finding::in_order(findings.collect());
+        let is_refitted = zeros == Zeros::Refit;
+        let blob_use = BlobUse::Evaluated { is_refitted };
+        let mut diagnosis = diagnose_blob(&log.dataset, stage, set, blob_use);
         diagnosis.validity = known.and_then(|known| {
             let parameters = FieldParameters::of_set(set, stage)?;
             let (white_mm, covariance) = (known.noise.white_mm, &known.covariance);
-            diagnose::temperature::validity(stage, &parameters, white_mm, covariance)
+            Validity::new(stage, &parameters, white_mm, covariance)
         });
         // As the blob's own errors were counted, whatever zeros are asked for.
         let comparable = judge.judgement(own_zeros).errors;
@@ -115,9 +115,9 @@ impl Evaluation {
 
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
-        let counts = of_counts(&self.judgement.zeros, self.judgement.undecoded);
+        let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
         let mut warnings = warnings_of(&self.log);
-        warnings.extend(counts.map(|found| found.message));
+        warnings.extend(counts.map(|found| words::message(&found)));
         let circumstances = Circumstances {
             warnings,
             ..Circumstances::new(&self.log, &self.stage, elapsed_s, self.diagnosis.clone())
@@ -162,7 +162,7 @@ impl Evaluation {
         let problem = self.problem.as_deref()?;
         // What the diagnosis found explains more than a remedy; warnings stand above already.
         let found = &self.diagnosis.findings;
-        let refusals = finding::messages(found, Severity::Refuse);
+        let refusals = words::paragraph(found, Severity::Refuse);
         let more = match (refusals.as_str(), found.iter().any(|f| f.severity == Severity::Warn)) {
             ("", true) => String::new(),
             ("", false) if is_field(&self.set) => {

@@ -4,10 +4,11 @@ use super::{Limits, failure};
 use crate::report::json::{Choice, Circumstances, Report, of_fit};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::of_fit as of_residuals;
-use hallstage_calibration::diagnose::{self, Diagnosis};
+use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
 use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::recalibrate::Known;
-use hallstage_input::finding::{self, Severity};
+use hallstage_calibration::words;
+use hallstage_input::finding::Severity;
 use hallstage_input::interrupt;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
@@ -79,7 +80,7 @@ impl FitOrder {
         stage: &Stage,
     ) -> Result<Outcome, CalibrateError> {
         let is_interrupted = interrupt::requested();
-        let diagnosis = diagnose::of_log(&log.dataset, stage, fitted.as_ref());
+        let diagnosis = diagnose_log(&log.dataset, stage, fitted.as_ref());
         if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
             fitted = match fitted {
                 Ok(fit) => {
@@ -132,7 +133,7 @@ impl Outcome {
 
     /// Why a fit is not to be used: findings, or errors beyond the limits.
     fn refusal_of(&self, fit: &Fit) -> Option<String> {
-        let refused = finding::messages(&self.diagnosis.findings, Severity::Refuse);
+        let refused = words::paragraph(&self.diagnosis.findings, Severity::Refuse);
         if !refused.is_empty() {
             return Some(format!("the log is refused: {refused}"));
         }
@@ -146,9 +147,8 @@ impl Outcome {
     /// What goes beside the blob: what is known of a field model; `None` of others.
     pub fn known(&self) -> Option<Known> {
         let field = self.fitted.as_ref().ok()?.field.as_ref()?;
-        let repair = self.diagnosis.repair.as_ref();
         Some(Known {
-            repaired: repair.map_or_else(Vec::new, |repair| repair.faults.clone()),
+            repaired: self.diagnosis.repaired().map(words::message).collect(),
             ..Known::of_fit(field)
         })
     }

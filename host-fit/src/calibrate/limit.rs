@@ -57,7 +57,7 @@ impl Limits {
             })
         });
         let errors = beyond.collect::<Vec<_>>().join("; ");
-        (!errors.is_empty()).then(|| format!("the errors {which} are beyond --limit: {errors}"))
+        (!errors.is_empty()).then(|| format!("the errors {which} are beyond --limit: {errors}."))
     }
 }
 

@@ -21,7 +21,8 @@ use crate::report::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::fit::{Fit, FitError};
 use hallstage_calibration::judge::identify::FitFailure;
-use hallstage_input::finding::{self, Code, Finding, Severity};
+use hallstage_calibration::words;
+use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
@@ -32,37 +33,26 @@ pub const NOT_WRITTEN: &str = "the fit failed its own checks, and no parameter b
 
 /// The warnings of a log that is diagnosed, which reports another rate itself.
 pub fn warnings_of(log: &LogReading) -> Vec<String> {
-    let messages = log.warnings.iter().map(|found| found.message.clone());
-    messages.collect()
+    words::messages(&log.warnings)
 }
 
 /// Whether findings explain why a fit failed.
 fn is_explained(error: &FitError, findings: &[Finding]) -> bool {
-    let spoils = |found: &Finding| {
-        let harmless = [
-            Code::TermsAtLimit,
-            Code::Jitter,
-            Code::RowsMissing,
-            Code::NotDetermined,
-        ];
-        found.severity >= Severity::Warn && !harmless.contains(&found.code)
+    // A model that does not describe the log is the last thing to be suspected.
+    let least = match error {
+        FitError::Failed(FitFailure::NotDescribed { .. }) => Severity::Warn,
+        _ => Severity::Refuse,
     };
-    match error {
-        // What it says may be wrong is for logs of which nothing is known.
-        FitError::Failed(FitFailure::NotDescribed { .. }) => findings.iter().any(spoils),
-        // What a log leaves open, the failure says better.
-        _ => {
-            let names = |found: &Finding| finding::is_explained(std::slice::from_ref(found));
-            findings
-                .iter()
-                .any(|found| found.code != Code::NotDetermined && names(found))
-        }
-    }
+    let explains = |found: &Finding| {
+        let from = found.code().entry().explains_from;
+        from.is_some_and(|from| found.severity >= from.max(least))
+    };
+    findings.iter().any(explains)
 }
 
 /// Why a log has no calibration, with what the diagnosis found.
 fn failure(error: &FitError, findings: &[Finding]) -> String {
-    let messages = finding::messages(findings, Severity::Warn);
+    let messages = words::paragraph(findings, Severity::Warn);
     match is_explained(error, findings) {
         _ if messages.is_empty() => format!("{NOT_WRITTEN}{error}"),
         true => refused(&messages),
@@ -76,7 +66,7 @@ fn refused(findings: &str) -> String {
 
 /// Why `check` refuses a log; `None` where it does not.
 pub fn check_refusal(fitted: Result<&Fit, &FitError>, findings: &[Finding]) -> Option<String> {
-    let refusals = finding::messages(findings, Severity::Refuse);
+    let refusals = words::paragraph(findings, Severity::Refuse);
     match fitted {
         Err(error) => Some(failure(error, findings)),
         Ok(_) if refusals.is_empty() => None,
@@ -120,7 +110,7 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
         "warnings": warnings_of(log),
         "verdict": diagnosis.verdict,
         "predicted": diagnosis.predicted,
-        "findings": diagnosis.findings,
+        "findings": words::worded(&diagnosis.findings),
         "trusted_inputs": fit.map_or_else(|| json!([]), |fit| trusted(&fit.set)),
     })
 }

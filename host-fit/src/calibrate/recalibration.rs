@@ -4,9 +4,10 @@ use super::warnings_of;
 use crate::report::errors::errors;
 use crate::report::field::by_axis;
 use crate::report::verdict::{End, Subject};
-use hallstage_calibration::fit::of_undecoded;
+use hallstage_calibration::fit::codes_refused;
 use hallstage_calibration::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
-use hallstage_input::finding::{Severity, messages};
+use hallstage_calibration::words;
+use hallstage_input::finding::Severity;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::update::Change;
@@ -41,7 +42,7 @@ impl Updated {
     ) -> Result<Self, RecalibrateError> {
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
-        let refusal = messages(&new.diagnosis.findings, Severity::Refuse);
+        let refusal = words::paragraph(&new.diagnosis.findings, Severity::Refuse);
         Ok(Self {
             figures: figures(change, &new, log, &warnings),
             refusal: Some(refusal).filter(|refusal| !refusal.is_empty()),
@@ -65,8 +66,8 @@ impl Updated {
 
 fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
     let mut warnings = warnings_of(log);
-    let undecoded = of_undecoded(new.judgement.undecoded);
-    warnings.extend(undecoded.map(|found| found.message));
+    let refused = codes_refused(new.judgement.undecoded);
+    warnings.extend(refused.as_ref().map(words::message));
     if new.known.is_none() {
         warnings.push(
             "no posterior stands beside the old blob: the predicted errors count those of the gains alone, and the new \
@@ -103,6 +104,6 @@ fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[St
         "warnings": warnings,
         "verdict": new.diagnosis.verdict,
         "predicted": new.diagnosis.predicted,
-        "findings": new.diagnosis.findings,
+        "findings": words::worded(&new.diagnosis.findings),
     })
 }

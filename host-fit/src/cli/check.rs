@@ -11,7 +11,7 @@ use crate::report::page::Errors;
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
-use hallstage_calibration::diagnose::{self, Diagnosis};
+use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_input::finding::{Finding, Severity};
@@ -53,7 +53,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         return Err(HostError::interrupted("nothing was written"));
     }
     let diagnosis = terminal::timed("diagnosis", || {
-        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+        diagnose_log(&log.dataset, &stage, fitted.as_ref())
     });
     let findings = &diagnosis.findings;
     let why = check_refusal(fitted.as_ref(), findings);

@@ -9,6 +9,7 @@ use crate::output::Output;
 use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
 use clap::Args;
+use hallstage_calibration::words;
 use hallstage_input::interrupt;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
@@ -81,7 +82,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     }
     terminal::print(&summary)?;
     super::wrote([args.out.clone()])?;
-    let warnings: Vec<String> = log.warnings.iter().map(|w| w.message.clone()).collect();
+    let warnings: Vec<String> = words::messages(&log.warnings);
     terminal::warn(&warnings);
     Ok(())
 }

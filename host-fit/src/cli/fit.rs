@@ -132,7 +132,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         let cause = outcome.refusal.unwrap_or_default();
         return Err(HostError::rejected(match &outcome.fitted {
             Ok(_) => {
-                format!("{cause}. No parameter blob was written; --force writes one that says so")
+                format!("{cause} No parameter blob was written; --force writes one that says so")
             }
             Err(_) => cause,
         }));

@@ -6,6 +6,7 @@
 use crate::cli::error::HostError;
 use crate::report::table::{Table, as_text, plain, with_signs};
 use anstyle::{AnsiColor, Style};
+use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -62,7 +63,7 @@ fn with_units(text: Cow<'_, str>) -> Cow<'_, str> {
     let locale = locale.to_string_lossy().to_lowercase();
     match locale.contains("utf-8") || locale.contains("utf8") {
         true => Cow::Owned(with_signs(&text)),
-        false => text,
+        false => Cow::Owned(text.replace('µ', "u").replace('°', "deg")),
     }
 }
 
@@ -101,8 +102,8 @@ pub(super) fn warn(warnings: &[String]) {
 pub(super) fn show(findings: &[Finding]) {
     for finding in findings.iter().filter(|_| !is_quiet()) {
         match finding.severity {
-            Severity::Note => line("note", AnsiColor::Cyan, &finding.message),
-            Severity::Warn => line("warning", AnsiColor::Yellow, &finding.message),
+            Severity::Note => line("note", AnsiColor::Cyan, words::message(finding)),
+            Severity::Warn => line("warning", AnsiColor::Yellow, words::message(finding)),
             Severity::Refuse => {}
         }
     }

@@ -4,6 +4,7 @@
 use super::chart::Chart;
 use super::table::{Table, with_signs};
 use super::verdict::Summary;
+use hallstage_calibration::words::Worded;
 use hallstage_input::finding::{Code, Finding, Severity};
 use minijinja::value::Serde;
 use minijinja::{Environment, Error, UndefinedBehavior};
@@ -36,7 +37,7 @@ pub struct Cause<'a> {
     remedy: &'static str,
     /// Predicted errors in service over the noise floor with the worst of them alone.
     cost: Option<f64>,
-    findings: Vec<&'a Finding>,
+    findings: Vec<Worded<'a>>,
 }
 
 impl<'a> Cause<'a> {
@@ -44,18 +45,18 @@ impl<'a> Cause<'a> {
     pub fn of(findings: &'a [Finding]) -> Vec<Self> {
         let mut causes: Vec<Self> = Vec::new();
         for found in findings {
-            match causes.iter_mut().find(|cause| cause.code == found.code) {
+            match causes.iter_mut().find(|cause| cause.code == found.code()) {
                 Some(cause) => {
                     cause.cost = cause.cost.into_iter().chain(found.cost).reduce(f64::max);
-                    cause.findings.push(found);
+                    cause.findings.push(Worded(found));
                 }
                 None => causes.push(Self {
-                    code: found.code,
+                    code: found.code(),
                     severity: found.severity,
-                    meaning: found.code.entry().meaning,
-                    remedy: found.code.entry().remedy,
+                    meaning: found.code().entry().meaning,
+                    remedy: found.code().entry().remedy,
                     cost: found.cost,
-                    findings: vec![found],
+                    findings: vec![Worded(found)],
                 }),
             }
         }

@@ -9,8 +9,10 @@ use crate::report::table::{Table, tables};
 use crate::report::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::fit::Fit;
-use hallstage_calibration::judge::verdict::{Predicted, Verdict};
+use hallstage_calibration::judge::predicted::Predicted;
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Judgement, Zeros};
+use hallstage_calibration::words;
 use hallstage_input::dataset::{Dataset, Movement};
 use hallstage_input::finding::Finding;
 use hallstage_input::log::LogReading;
@@ -112,6 +114,7 @@ pub struct Report {
     /// The errors by degree of mount and body, where the logs have temperatures.
     pub temperatures: Vec<Value>,
     /// What a diagnosis of the log found, by severity.
+    #[serde(serialize_with = "words::serialize")]
     pub findings: Vec<Finding>,
     /// The same errors log by log.
     pub logs: Vec<Value>,
@@ -178,13 +181,13 @@ impl<'a> Circumstances<'a> {
         elapsed_s: f64,
         diagnosis: Diagnosis,
     ) -> Self {
-        let warnings = log.warnings.iter().map(|found| found.message.clone());
+        let warnings = words::messages(&log.warnings);
         Self {
             stage,
             dataset: &log.dataset,
             skipped_rows: log.skipped_rows,
             elapsed_s,
-            warnings: warnings.collect(),
+            warnings,
             diagnosis,
         }
     }
@@ -244,7 +247,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         None => parameters(fit.model, &fit.solution.parameters, &fit.standard_error),
     };
     let by_row = fit.decoded.errors_less(&fit.judgement.zeros, c.dataset);
-    let warnings = fit.warnings.iter().map(|found| found.message.clone());
+    let warnings = words::messages(&fit.warnings);
     let standard_errors = match fit.field {
         Some(_) => {
             "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior"

@@ -6,7 +6,7 @@ use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_input::dataset::{Movement, Row};
-use hallstage_input::finding::{Code, Finding};
+use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, stage};
 
@@ -136,9 +136,12 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
 #[test]
 fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with_the_rows() {
     let stage = stage();
-    let found = |message: &str, cost| Finding::new(Code::ChannelsSwapped, message).costing(cost);
+    let found = |log: &str, cost| Finding {
+        log: Some(log.to_owned()),
+        ..Finding::new(Kind::UnevenTimes { rms_us: 3.0 }).with_cost(cost)
+    };
     let diagnosis = Diagnosis {
-        findings: vec![found("Hall A & B", 3.0), found("Hall C", 7.25)],
+        findings: vec![found("A & B.csv", 3.0), found("C.csv", 7.25)],
         ..Diagnosis::default()
     };
     let length = |copies: usize| {
@@ -154,9 +157,9 @@ fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with
         let page = source.html().expect("a page");
         assert!(page.contains("Refused</b>: it does not fit"));
         // One cause, with the cost of the worst.
-        assert_eq!(page.matches("<code>channels_swapped</code>").count(), 1);
+        assert_eq!(page.matches("<code>jitter</code>").count(), 1);
         assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));
-        assert!(page.contains("Hall A &amp; B (cost 3.0)"));
+        assert!(page.contains("A &amp; B.csv: Rows come"));
         assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
         // Signals, and errors with the designed values.
         assert_eq!(page.matches("<svg ").count(), 4);

@@ -2,8 +2,9 @@
 
 use super::table::{Table, as_text};
 use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::judge::predicted::{Predicted, Validity};
 use hallstage_calibration::judge::statistics::PoseError;
-use hallstage_calibration::judge::verdict::{LIMITED_MAX, Predicted, Validity, Verdict};
+use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
 use hallstage_input::finding::Severity;
 use serde::Serialize;
 
@@ -192,7 +193,7 @@ fn next(of: &Subject, verdict: Option<Verdict>) -> String {
     let findings = &of.diagnosis.findings;
     let remedy = |least: Severity| {
         let worst = findings.iter().find(|found| found.severity >= least);
-        worst.map(|found| found.code.entry().remedy.to_owned())
+        worst.map(|found| found.code().entry().remedy.to_owned())
     };
     let usual = match of.end {
         End::Written => "judge it on another log with host-fit eval",
@@ -215,7 +216,7 @@ fn next(of: &Subject, verdict: Option<Verdict>) -> String {
 mod tests {
     use super::*;
     use hallstage_calibration::judge::statistics::AxisError;
-    use hallstage_input::finding::{Code, Finding};
+    use hallstage_input::finding::{Finding, Kind};
 
     const PREDICTED: Predicted = Predicted {
         rms: [1.2e-6, 0.5e-6, 2.4e-6],
@@ -233,7 +234,10 @@ mod tests {
             rows: 1,
         };
         let diagnosis = Diagnosis {
-            findings: vec![Finding::new(Code::Hum, "")],
+            findings: vec![Finding::new(Kind::Hum {
+                frequency_hz: 50.0,
+                amplitude_m: 1e-6,
+            })],
             verdict,
             predicted: Some(PREDICTED),
             validity: Some(Validity {

@@ -47,7 +47,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
     for (log, words, code) in [
         (
             "turned.csv",
-            "the sign of Hall C is turned",
+            "the sign of Hall C is inverted",
             "channel_inverted",
         ),
         (
@@ -183,7 +183,10 @@ fn eval_judges_a_blob_by_its_own_errors() {
     );
     bench.good("fit log.csv --out p.bin");
     bench.good("eval p.bin log.csv");
-    let parts = ["more than 10 times", "fits if the sign of Hall A is turned"];
+    let parts = [
+        "more than 10 times",
+        "fits if the sign of Hall A is inverted",
+    ];
     bench.bad("eval p.bin turned.csv --json e.json", 4, &parts);
     assert_eq!(
         bench.json("e.json")["findings"][0]["code"],

@@ -65,7 +65,7 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let lacks = &of_31["findings"][0];
     let message = lacks["message"].as_str().expect("a sentence");
     assert!(
-        message.contains("times the noise from sample to sample"),
+        message.contains("times the noise from row to row"),
         "{lacks}"
     );
     assert_eq!(
@@ -110,7 +110,7 @@ fn a_late_reference_is_reported_by_every_model_and_taken_off() {
     for model in ["31", "field", "auto"] {
         let fit = format!("fit late.csv --out p.bin --model {model} --json p.json");
         let output = bench.good(&fit);
-        says(stderr(&output), "the reference lags behind the probes by ");
+        says(stderr(&output), "behind the probes");
         let json = bench.json("p.json");
         let lag = &json["reference_lag"];
         let (value_us, error_us) = (number(&lag["value_us"]), number(&lag["standard_error_us"]));
@@ -154,9 +154,9 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         assert!(said.starts_with(reason), "{said}");
         let findings = json["findings"].as_array().expect("a list");
         let note = findings.iter().find(|found| found["code"] == "model_lacks");
-        let expected = note.and_then(|note| note["message"].as_str()?.strip_prefix(said));
+        let message = note.and_then(|note| note["message"].as_str());
         assert_eq!(
-            expected.map(|expected| expected.contains("in service expect")),
+            message.map(|message| message.contains("in service expect")),
             (model == "31").then_some(true)
         );
         let (verdict, worst) = (&json["verdict"], number(&json["predicted"]["worst_ratio"]));
@@ -179,7 +179,7 @@ fn a_log_of_little_motion_is_a_warning() {
     let stage = stage.replace("rz = { service_rad = 500e-6", "rz = { service_rad = 1.2e-3");
     bench.write("wide.toml", stage);
     let fit = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
-    assert!(stderr(&fit).contains("moves rz by 5"), "{}", stderr(&fit));
+    assert!(stderr(&fit).contains("moves Rz by 5"), "{}", stderr(&fit));
     let fit = bench.good("fit log.csv --out p.bin --model field");
     assert_eq!(stderr(&fit), "");
 }

@@ -26,7 +26,7 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
         (&have["errors"], &have["movements"]),
         (&want["errors"], &57.into())
     );
-    says(&warnings, "the times tell 57");
+    says(&warnings, "The times separate 57");
     bench.good("eval p.bin whole.csv --split 2");
     let refused = "fit log.csv --out p.bin --split 2";
     bench.bad(refused, 3, &["log.csv", "--split does not apply"]);

@@ -119,7 +119,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     );
     assert!(number(&bench.json("fit.json")["valid_within_k"]) > 0.1);
     let repaired = bench.json("inspect.json")["repaired"][0].to_string();
-    says(&repaired, "the gain of Hall B changes");
+    says(&repaired, "The gain of Hall B changes");
     assert_eq!(
         bench.json("inspect.json")["repaired"]
             .as_array()

@@ -103,7 +103,7 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
     let other = bench.text("warm.toml") + "magnet = \"SmCo\"\n";
     bench.write("other.toml", other);
     let fit = "fit cold.csv later.csv warm.csv --stage other.toml --model field --out x.bin";
-    bench.bad(fit, 4, &["standard deviations from what `magnet`"]);
+    bench.bad(fit, 4, &["standard deviations from `magnet`"]);
 }
 
 /// A row without its last two cells.

@@ -2,8 +2,8 @@
 //! right.
 
 use super::bank::UNDECIDED;
-use super::slopes::{CHANNELS, title};
-use hallstage_input::finding::Code;
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Cause, Code, Correction};
 use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
@@ -28,12 +28,10 @@ impl Change {
 #[derive(Clone, Debug)]
 pub(super) struct Mistake {
     pub(super) code: Code,
-    /// The channels, as in [`Finding::channel`](hallstage_input::finding::Finding::channel).
-    pub(super) channel: String,
-    /// What sets the log right, as the end of "it fits if ...", but for the value.
-    pub(super) what: String,
-    /// What follows: the factor of a scale, or how far something is turned, degrees.
-    pub(super) value: Option<(f64, &'static str)>,
+    /// What sets the log right, but for the value.
+    pub(super) correction: Correction,
+    /// The factor of a scale, or how far something is turned, degrees.
+    pub(super) value: Option<f64>,
     /// What a value that may be any costs: twice the logarithm of the odds.
     pub(super) penalty: f64,
     /// Whether other magnets than designed show the same.
@@ -47,11 +45,11 @@ const POWERS: i32 = 6;
 /// Turns that are tried, degrees.
 const TURN_DEG: i32 = 10;
 
-/// Of Hall probes, beams and gaps: all of them together, the codes of an exchange and of a sign.
-const SIDES: [(&str, [Code; 2]); 3] = [
-    ("hall", [Code::ChannelsSwapped, Code::ChannelInverted]),
-    ("ifm", [Code::BeamsSwapped, Code::BeamInverted]),
-    ("cap", [Code::CapacitiveSwapped, Code::CapacitiveInverted]),
+/// The codes of an exchange and of a sign: of Hall probes, beams and gaps.
+const SIDES: [[Code; 2]; 3] = [
+    [Code::ChannelsSwapped, Code::ChannelInverted],
+    [Code::BeamsSwapped, Code::BeamInverted],
+    [Code::CapacitiveSwapped, Code::CapacitiveInverted],
 ];
 
 /// All mistakes with order, sign, scale and place; of the gaps those that codes can have.
@@ -66,25 +64,16 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             continue;
         };
         let change = |matrix: Matrix3<f64>| Change::of(side, to_pose * matrix * to_channels);
-        let (all, [swapped, inverted]) = SIDES[side];
-        let own = &CHANNELS[3 * side..][..3];
-        // The channels, and what they are called.
-        let names = |some: &[usize]| {
-            let named = match some.len() {
-                3 => vec![all],
-                _ => some.iter().map(|&k| own[k]).collect(),
-            };
-            (named.join(", "), titles(&named))
-        };
+        let [swapped, inverted] = SIDES[side];
+        let (all, own) = (Channel::GROUPS[side], &Channel::SINGLE[3 * side..][..3]);
         for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
             let moved: Vec<usize> = (0..3).filter(|&k| order[k] != k).collect();
-            let (channel, of) = names(&moved);
-            let what = match moved[..] {
-                [_, _] => format!("{of} are exchanged"),
-                _ => format!("{of} are read as {}", titles(&order.map(|k| own[k]))),
+            let correction = match moved[..] {
+                [one, other] => Correction::Exchange([own[one], own[other]]),
+                _ => Correction::Order(all, order.map(|k| own[k])),
             };
             let matrix = Matrix3::from_fn(|i, j| f64::from(u8::from(j == order[i])));
-            out.push(mistake(swapped, channel, what, change(matrix)));
+            out.push(mistake(swapped, correction, change(matrix)));
         }
         for bits in 1..8u32 {
             let some: Vec<usize> = (0..3).filter(|k| bits >> k & 1 == 1).collect();
@@ -92,17 +81,18 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
                 let of = |k: usize| if some.contains(&k) { factor } else { 1.0 };
                 change(Matrix3::from_diagonal(&[0, 1, 2].map(of).into()))
             };
-            let (channel, of) = names(&some);
-            let what = format!("the scale of {of} is multiplied by");
+            let named = match some.len() {
+                3 => vec![all],
+                _ => some.iter().map(|&k| own[k]).collect(),
+            };
             let first = out.len();
-            scales(&mut out, &channel, &what, times);
-            for mistake in out[first..].iter_mut().filter(|_| channel == "cap") {
-                // Their field falls with the height half as fast, or less than twice.
+            scales(&mut out, &Correction::Scale(named.clone()), times);
+            for mistake in out[first..].iter_mut().filter(|_| named == [Channel::Gaps]) {
+                // The field of such magnets falls with height half as fast, or less than twice.
                 let factors = 0.5..2.0;
-                mistake.may_be_magnets = mistake.value.is_some_and(|(by, _)| factors.contains(&by));
+                mistake.may_be_magnets = mistake.value.is_some_and(|by| factors.contains(&by));
             }
-            let what = format!("the sign of {of} is turned");
-            out.push(mistake(inverted, channel, what, times(-1.0)));
+            out.push(mistake(inverted, Correction::Sign(named), times(-1.0)));
         }
     }
     // Rz of the reference, and Rx and Ry, are so many times larger.
@@ -110,25 +100,21 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
         let diagonals = [[1.0; 3], [1.0, 1.0, rz], [1.0, tilts, tilts]];
         Change(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
     };
-    let what = "Rz of the reference (1 / interferometer.y_baseline_m) is multiplied by";
-    scales(&mut out, "rz", what, |factor| turned(factor, 1.0));
-    let what = "the places of the Hall probes are multiplied by";
-    scales(&mut out, "hall", what, |factor| {
-        turned(1.0 / factor, 1.0 / factor)
+    scales(&mut out, &Correction::BaselineScale, |by| turned(by, 1.0));
+    scales(&mut out, &Correction::HallPlaces, |by| {
+        turned(1.0 / by, 1.0 / by)
     });
     if has_codes {
-        let what = "the places of the capacitive sensors are multiplied by";
-        scales(&mut out, "cap", what, |factor| turned(1.0, 1.0 / factor));
+        scales(&mut out, &Correction::GapPlaces, |by| turned(1.0, 1.0 / by));
         places(&mut out, stage, &gaps);
     }
     out
 }
 
-const fn mistake(code: Code, channel: String, what: String, change: Change) -> Mistake {
+const fn mistake(code: Code, correction: Correction, change: Change) -> Mistake {
     Mistake {
         code,
-        channel,
-        what,
+        correction,
         value: None,
         penalty: 0.0,
         may_be_magnets: false,
@@ -137,7 +123,7 @@ const fn mistake(code: Code, channel: String, what: String, change: Change) -> M
 }
 
 /// One mistake for each factor.
-fn scales(out: &mut Vec<Mistake>, channel: &str, what: &str, change: impl Fn(f64) -> Change) {
+fn scales(out: &mut Vec<Mistake>, correction: &Correction, change: impl Fn(f64) -> Change) {
     let powers = (-FACTORS * POWERS..=FACTORS * POWERS).filter(|power| *power != 0);
     let any = powers.map(|power| {
         let factor = 10f64.powf(f64::from(power) / f64::from(FACTORS));
@@ -146,14 +132,9 @@ fn scales(out: &mut Vec<Mistake>, channel: &str, what: &str, change: impl Fn(f64
     out.extend(
         any.chain([(2.0, true), (0.5, true)])
             .map(|(factor, is_usual)| Mistake {
-                value: Some((factor, "")),
+                value: Some(factor),
                 penalty: penalty(is_usual),
-                ..mistake(
-                    Code::ScaleWrong,
-                    channel.into(),
-                    what.into(),
-                    change(factor),
-                )
+                ..mistake(Code::ScaleWrong, correction.clone(), change(factor))
             }),
     );
 }
@@ -166,14 +147,13 @@ const fn penalty(is_usual: bool) -> f64 {
 /// Sensors that stand elsewhere than `stage.toml` says.
 fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     let designed = stage.capacitive_probes_m;
-    let mut add = |channel: &str, what: String, value, penalty, places: ProbePositions<f64>| {
+    let mut add = |correction, value, penalty, places: ProbePositions<f64>| {
         out.extend(of_gaps(&places).try_inverse().map(|to_pose| Mistake {
             value,
             penalty,
             ..mistake(
                 Code::CapacitiveInverted,
-                channel.into(),
-                what,
+                correction,
                 Change::of(2, to_pose * gaps),
             )
         }));
@@ -182,13 +162,16 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
         let mut places = designed;
         let place = &mut places[sensor][axis];
         *place = -*place;
-        let (name, number) = (["x", "y"][axis], sensor + 1);
-        let what = format!("the {name} of capacitive sensor {number} in stage.toml is {place} m");
+        let channel = Channel::SINGLE[6 + sensor];
+        let correction = Correction::GapPlace(channel, ["x", "y"][axis], *place);
         if *place != 0.0 {
-            add(CHANNELS[6 + sensor], what, None, 0.0, places);
+            add(correction, None, 0.0, places);
         }
     }
-    for (how, sign) in [("turned by", 1.0), ("mirrored along x and turned by", -1.0)] {
+    for (correction, sign) in [
+        (Correction::GapsTurned, 1.0),
+        (Correction::GapsMirrored, -1.0),
+    ] {
         for degrees in (-180 + TURN_DEG..=180)
             .step_by(TURN_DEG as usize)
             .filter(|turn| sign < 0.0 || *turn != 0)
@@ -196,51 +179,31 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
             let (sin, cos) = libm::sincos(f64::from(degrees).to_radians());
             let places =
                 designed.map(|[x, y]| [cos * sign * x - sin * y, sin * sign * x + cos * y]);
-            let what = format!("the places of the capacitive sensors are {how}");
+            let penalty = penalty(degrees % 90 == 0);
             add(
-                "cap",
-                what,
-                Some((f64::from(degrees), " degrees")),
-                penalty(degrees % 90 == 0),
+                correction.clone(),
+                Some(f64::from(degrees)),
+                penalty,
                 places,
             );
         }
     }
 }
 
-/// What sets the log right: the first of mistakes that differ by a value, with all values that do.
-pub(super) fn cure(alike: &[&Mistake]) -> String {
+/// What sets the log right: the first of mistakes that differ by a value, with the range of their values.
+pub(super) fn cause(alike: &[&Mistake]) -> Cause {
     let first = alike[0];
-    let Some((value, unit)) = first.value else {
-        return first.what.clone();
-    };
-    // Two digits of a factor.
-    let shown = |value: f64| {
-        let digits = match unit.is_empty() {
-            true => 1 - value.log10().floor() as i32,
-            false => 0,
-        };
-        let place = 10f64.powi(-digits);
-        format!(
-            "{:.*}",
-            digits.max(0) as usize,
-            (value / place).round() * place
-        )
-    };
-    let values = alike.iter().filter_map(|mistake| Some(mistake.value?.0));
-    let ends = values.fold([value; 2], |[low, high], value| {
-        [low.min(value), high.max(value)]
-    });
-    let range = match ends.map(shown) {
-        [low, high] if low != high => format!(" ({low} to {high})"),
-        _ => String::new(),
-    };
-    format!("{} about {}{unit}{range}", first.what, shown(value))
-}
-
-fn titles(channels: &[&str]) -> String {
-    let titles: Vec<String> = channels.iter().map(|channel| title(channel)).collect();
-    titles.join(" and ")
+    let values = || alike.iter().filter_map(|mistake| mistake.value);
+    Cause {
+        correction: first.correction.clone(),
+        values: first.value.map(|best| {
+            [
+                best,
+                values().fold(best, f64::min),
+                values().fold(best, f64::max),
+            ]
+        }),
+    }
 }
 
 /// Gap changes 1, 2, 3 of a vertical pose Z, Rx, Ry: z + rx y - ry x.

@@ -23,7 +23,7 @@
 //! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
 //! use hallstage_calibration::judge::verdict::Verdict;
 //!
-//! let diagnosis = hallstage_calibration::diagnose::of_log(&dataset, &stage, Ok(&fit));
+//! let diagnosis = hallstage_calibration::diagnose::diagnose_log(&dataset, &stage, Ok(&fit));
 //! assert!(diagnosis.findings.is_empty());
 //! assert_eq!(diagnosis.verdict, Some(Verdict::Good));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -40,12 +40,13 @@ pub mod structure;
 mod structure_tests;
 pub mod temperature;
 
-use crate::fit::{Fit, FitError, Repair};
+use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
-use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Validity, Verdict};
+use crate::judge::predicted::{Predicted, Validity};
+use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused, severity};
 use bank::Fitted;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Code, Finding, Severity, in_order, is_explained};
+use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::parameters::Parameters;
 use hallstage_solver::solve::field::parameters::FieldParameters;
@@ -57,9 +58,9 @@ use std::borrow::Cow;
 pub struct Diagnosis {
     /// What is wrong, the most severe first.
     pub findings: Vec<Finding>,
-    /// Whether the calibration can be used; `None` where a log cannot show that for a blob.
+    /// Whether the calibration can be used; `None` for a blob where the log cannot predict its errors.
     pub verdict: Option<Verdict>,
-    /// The errors that it has to expect at work; `None` where the log is too short or too still to show them.
+    /// The errors to expect in service; `None` where the log is too short or too still to predict them.
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log, for which the verdict is: see [`Fit::repaired`].
     pub repair: Option<Repair>,
@@ -67,52 +68,59 @@ pub struct Diagnosis {
     pub validity: Option<Validity>,
 }
 
-/// Everything that is wrong with a log, and the verdict; `fitted` is what came of the fit to it.
+/// The diagnosis of a log and of the fit to it.
 ///
-/// Rows that the fit left out of account are for the tests of the signals and the channels alone.
-pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Diagnosis {
+/// Only the tests of the signals and the channels use rows that the fit rejected.
+pub fn diagnose_log(
+    dataset: &Dataset,
+    stage: &Stage,
+    fitted: Result<&Fit, &FitError>,
+) -> Diagnosis {
     let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
-    let sound = match fitted.map_or(&[][..], |fit| &fit.outliers) {
+    let without_outliers = match fitted.map_or(&[][..], |fit| &fit.outliers) {
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
-    let (parameters, lag_s) = parameters_of(fitted, stage);
+    let own = Described::by_fit(fitted, stage);
+    let best = fitted
+        .ok()
+        .and_then(|fit| Described::better(fit, dataset, stage));
+    let best = best.unwrap_or(own);
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
     let by = Fitted {
-        parameters: &parameters,
+        parameters: &own.parameters,
+        start: &best.parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         for_service: field.is_some_and(|field| !field.verdict.by_resets),
         is_to_rows: fitted.is_ok(),
     };
     let mut out = Diagnosis::default();
+    // A log that determines no parameters shows nothing of its channels.
+    let is_described = match fitted {
+        Ok(_) => true,
+        Err(error) => matches!(error, FitError::Failed(FitFailure::NotDescribed { .. })),
+    };
+    out.add_faults(
+        dataset,
+        &without_outliers,
+        stage,
+        (by, best.lag_s),
+        is_described,
+    );
     match fitted {
-        Err(error) => {
-            // A log that determines nothing says nothing of its channels.
-            let described = matches!(error, FitError::Failed(FitFailure::NotDescribed { .. }));
-            out.shown(dataset, &sound, stage, by, lag_s, described);
-            out.predicted = None;
-        }
-        Ok(fit) => {
-            out.shown(dataset, &sound, stage, by, lag_s, true);
-            out.add_of_fit(fit, dataset, stage);
-        }
+        Ok(fit) => out.add_fit(fit, dataset, stage),
+        Err(_) => out.predicted = None,
     }
-    let findings = &mut out.findings;
-    findings.extend(of_fit::short_movements(fitted.ok(), dataset));
-    *findings = in_order(std::mem::take(findings));
-    let (refused, ratio) = (is_refused(findings), out.predicted.map(|p| p.worst_ratio()));
-    if let Some(ratio) = ratio.filter(|ratio| by.for_service && *ratio > LIMITED_MAX && !refused) {
-        let message = format!(
-            "all that is wrong with the log together makes errors of {ratio:.2} times the noise floor at work"
-        );
-        findings.insert(0, Finding::new(Code::NotDetermined, message).costing(ratio));
-    }
-    out.verdict = Some(match fitted {
-        Ok(_) => Verdict::new(by.for_service, out.predicted.as_ref(), findings),
-        Err(_) => Verdict::Refused,
-    });
+    let short = of_fit::short_movements(fitted.ok(), dataset);
+    out.findings.extend(short);
+    let is_for_service = by.for_service;
+    let basis = match fitted {
+        Ok(_) => Basis::Fit { is_for_service },
+        Err(_) => Basis::NoFit,
+    };
+    out.conclude(basis);
     out.validity = field.and_then(|field| {
         let (mut parameters, mut covariance) =
             (field.parameters, field.posterior.covariance.clone());
@@ -122,61 +130,91 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
                 .view_mut((0, 0), repair.covariance.shape())
                 .copy_from(&repair.covariance);
         }
-        temperature::validity(stage, &parameters, field.noise.white_mm, &covariance)
+        Validity::new(stage, &parameters, field.noise.white_mm, &covariance)
     });
     out
 }
 
-/// The parameters of a fit, those of the drawing where there is none, and the lag of the reference, s.
-fn parameters_of(fitted: Result<&Fit, &FitError>, stage: &Stage) -> (FieldParameters, f64) {
-    let of_31 = |parameters| FieldParameters::of_model_31(parameters, stage);
-    match fitted {
-        Ok(fit) => (
-            (fit.field.as_ref()).map_or_else(|| of_31(&fit.solution.parameters), |f| f.parameters),
-            fit.lag.map_or(0.0, |lag| lag.value_s),
-        ),
-        Err(_) => (of_31(&Parameters::designed(stage)), 0.0),
-    }
+/// What predicts the signals of a log.
+#[derive(Clone, Copy, Debug)]
+struct Described {
+    parameters: FieldParameters,
+    /// The lag of the reference, s.
+    lag_s: f64,
 }
 
-fn is_refused(findings: &[Finding]) -> bool {
-    findings.iter().any(|f| f.severity == Severity::Refuse)
+impl Described {
+    /// The parameters of a fit, or of the drawing where there is no fit.
+    fn by_fit(fitted: Result<&Fit, &FitError>, stage: &Stage) -> Self {
+        let of_31 = |parameters| FieldParameters::of_model_31(parameters, stage);
+        match fitted {
+            Ok(fit) => Self {
+                parameters: match &fit.field {
+                    Some(field) => field.parameters,
+                    None => of_31(&fit.solution.parameters),
+                },
+                lag_s: match (&fit.later, fit.lag) {
+                    (None, Some(lag)) => lag.value_s,
+                    // It is taken off the rows.
+                    _ => 0.0,
+                },
+            },
+            Err(_) => Self {
+                parameters: of_31(&Parameters::designed(stage)),
+                lag_s: 0.0,
+            },
+        }
+    }
+
+    /// The best description of the log where this fit is a poor one, as of a search that has not converged: the
+    /// signals show no fault of their own there.
+    fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<Self> {
+        let over_noise = of_fit::over_noise(poor, dataset);
+        if poor.field.is_some() || over_noise <= of_fit::ERROR_TO_NOISE_MAX {
+            return None;
+        }
+        let best = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto)).ok()?;
+        let is_better = of_fit::over_noise(&best, best.rows(dataset)) < over_noise;
+        is_better.then(|| Self::by_fit(Ok(&best), stage))
+    }
 }
 
 fn are_notes(findings: &[Finding]) -> bool {
     findings.iter().all(|f| f.severity == Severity::Note)
 }
 
+/// Whether the rows of a finding are left out, so that the calibration can be free of it.
+const fn stands(found: &Finding) -> bool {
+    matches!(found.code(), Code::Stuck | Code::Saturated)
+}
+
 impl Diagnosis {
-    /// What signals, channels and structure show, and what that predicts. `has_channels` where the log is
-    /// described by the parameters.
-    fn shown(
+    /// Adds the faults of signals, channels and structure, and what they predict. `is_described` where the
+    /// parameters describe the log.
+    fn add_faults(
         &mut self,
         dataset: &Dataset,
-        sound: &Dataset,
+        without_outliers: &Dataset,
         stage: &Stage,
-        by: Fitted,
-        lag_s: f64,
-        has_channels: bool,
+        (by, lag_s): (Fitted, f64),
+        is_described: bool,
     ) {
-        let (findings, bad) = signals::signal_findings(dataset, stage, (by.parameters, lag_s));
+        let (findings, bad) = signals::signal_findings(dataset, stage, (by.start, lag_s));
         self.findings = findings;
         // Rows that jump are for the loss of the fit.
-        let stands = |found: &&Finding| matches!(found.code, Code::Stuck | Code::Saturated);
-        let stand = self.findings.iter().any(|found| stands(&found));
-        let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
-        let of_rows =
-            has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by, stand));
-        let of_rows = of_rows.flatten();
-        // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
+        let is_bent = self.findings.iter().any(stands);
+        let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
+        let rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by, is_bent));
+        let of_rows = rows.flatten();
+        // A fault whose repair leaves no more than noise explains what a mistake would.
         let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
         if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
-            let parts = |found: &Finding| found.code == Code::LogsDisagree;
+            let parts = |found: &Finding| found.code() == Code::LogsDisagree;
             let disagree = of_rows
                 .as_ref()
                 .is_some_and(|of| of.findings.iter().any(parts));
-            self.findings
-                .extend(structure::structure(sound, stage, disagree));
+            let mistake = structure::structure(without_outliers, stage, disagree);
+            self.findings.extend(mistake);
         }
         let Some(mut of) = of_rows else { return };
         self.predicted = of.predicted;
@@ -184,101 +222,118 @@ impl Diagnosis {
             return;
         }
         if of.rest > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
-            let message = format!(
-                "the log does not fit to itself: {:.1} times the noise are left of the Hall signals, and no single fault explains them. Fit parts of it",
-                of.rest
-            );
             // Of other models it is what they lack.
-            let cost = of
-                .predicted
-                .map_or(1.0, |predicted| predicted.worst_ratio());
+            let cost = of.predicted.map_or(1.0, |of| of.worst_ratio());
             let severity = match by.model {
-                ModelKind::Field => bank::severity(cost).max(Severity::Warn),
+                ModelKind::Field => severity(cost).max(Severity::Warn),
                 _ => Severity::Refuse,
             };
-            let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
-            of.findings.push(lacks.of(of.rest, "times").costing(cost));
+            let found = Finding::new(Kind::Inconsistent { ratio: of.rest });
+            of.findings
+                .push(found.with_severity(severity).with_cost(cost));
         }
         if let Some((repair, expected)) = of.repair {
-            for found in &mut of.findings {
-                found.message += ". The calibration has this taken off, and is that of the stage at the end of the log: zero the stage before it is used";
+            let stand = self.findings.iter_mut().filter(|found| stands(found));
+            for found in stand.chain(&mut of.findings) {
+                found.is_repaired = true;
                 found.severity = found.severity.min(Severity::Warn);
             }
-            let of_both = of
-                .findings
-                .iter()
-                .chain(self.findings.iter().filter(stands));
-            let faults = of_both.map(|found| found.message.clone()).collect();
-            (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
+            (self.predicted, self.repair) = (Some(expected), Some(repair));
         }
         self.findings.extend(of.findings);
     }
 
-    /// What a fit says of itself, where no fault says it already.
-    fn add_of_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
+    /// Adds what only the fit shows, where no fault explains it.
+    fn add_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
         let findings = &mut self.findings;
-        // Rows that a fault explains are no riddle.
+        // A fault explains the rows that are left out.
         if self.repair.is_none() {
             findings.extend(of_fit::left_out(fit, dataset));
         }
         // One beam that is late is a lag of all of them to a fit.
         let is_late = findings
             .iter()
-            .any(|found| found.code == Code::ReferenceLag);
-        let of_fit = fit.warnings.iter();
-        let of_fit = of_fit.filter(|found| !is_late || found.code != Code::ReferenceLag);
-        findings.extend(of_fit.cloned());
+            .any(|found| found.code() == Code::ReferenceLag);
+        let warnings = fit.warnings.iter();
+        let warnings = warnings.filter(|found| !is_late || found.code() != Code::ReferenceLag);
+        findings.extend(warnings.cloned());
         findings.extend(temperature::findings(fit, dataset, stage));
         findings.extend(range::undeclared(fit, stage));
-        if !is_explained(findings) {
+        let explains = |found: &Finding| {
+            found.severity >= Severity::Refuse
+                || found.code().entry().explains_from == Some(Severity::Note)
+        };
+        if !findings.iter().any(explains) {
             findings.extend(of_fit::undescribed(fit, dataset));
             let unexplained = are_notes(findings).then(|| of_fit::over_noise(fit, dataset));
             findings.extend(of_fit::not_field(fit, self.predicted.as_ref(), unexplained));
         }
     }
+
+    fn conclude(&mut self, basis: Basis) {
+        let findings = std::mem::take(&mut self.findings);
+        (self.findings, self.verdict) = conclude(findings, self.predicted.as_ref(), basis);
+    }
+
+    /// The faults of the log that the calibration is free of.
+    pub fn repaired(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|found| found.is_repaired)
+    }
 }
 
-/// Everything that is wrong with a log that a blob is judged on. Of a blob that was `fitted` to it with what was
-/// known before, this is what service has to expect.
-pub fn of_judged(
+/// How a blob came to the log on which it is diagnosed.
+#[derive(Clone, Copy, Debug)]
+pub enum BlobUse {
+    /// It was recalibrated by the log, with these errors to expect in service.
+    Recalibrated(Option<Predicted>),
+    /// It is from another log; zero deviations are refitted or not.
+    Evaluated {
+        /// Whether they are.
+        is_refitted: bool,
+    },
+}
+
+/// The diagnosis of a log on which a blob is judged.
+pub fn diagnose_blob(
     dataset: &Dataset,
     stage: &Stage,
     set: &ParameterSet,
-    fitted: Option<Predicted>,
+    blob_use: BlobUse,
 ) -> Diagnosis {
     let dataset = &*dataset.compensated(set.constants.temperature.rounded());
     let of_field = FieldParameters::of_set(set, stage);
     let of_31 = || FieldParameters::of_model_31(&Parameters::of_set(set), stage);
-    let for_service = of_field.is_some();
+    let is_for_service = of_field.is_some();
+    let parameters = &of_field.unwrap_or_else(of_31);
     let by = Fitted {
-        parameters: &of_field.unwrap_or_else(of_31),
-        model: if for_service {
+        parameters,
+        start: parameters,
+        model: if is_for_service {
             ModelKind::Field
         } else {
             set.model
         },
-        for_service,
+        for_service: is_for_service,
         is_to_rows: false,
     };
     let mut out = Diagnosis::default();
-    out.shown(dataset, dataset, stage, by, 0.0, true);
-    out.predicted = fitted.or(out.predicted);
-    let findings = &mut out.findings;
-    if fitted.is_none() {
-        // A fault bends only what is fitted.
-        for found in findings.iter_mut().filter(|found| found.cost.is_some()) {
-            found.severity = found.severity.min(Severity::Warn);
+    out.add_faults(dataset, dataset, stage, (by, 0.0), true);
+    out.findings.extend(range::out_of_range(set, dataset));
+    let temperature = &set.constants.temperature;
+    out.findings
+        .extend(temperature::missing(temperature, dataset));
+    let basis = match blob_use {
+        BlobUse::Recalibrated(Some(predicted)) => {
+            out.predicted = Some(predicted);
+            Basis::Recalibrated
         }
-    }
-    findings.extend(range::out_of_range(set, dataset));
-    findings.extend(temperature::missing(&set.constants.temperature, dataset));
-    *findings = in_order(std::mem::take(findings));
-    let is_bent = fitted.is_some() && findings.iter().any(|f| f.cost > Some(GOOD_MAX));
-    out.verdict = (out.predicted).map(|predicted| {
-        match Verdict::new(for_service, Some(&predicted), findings) {
-            Verdict::Good if is_bent => Verdict::Limited,
-            verdict => verdict,
+        BlobUse::Recalibrated(None) => Basis::Blob { is_for_service },
+        BlobUse::Evaluated { is_refitted } => {
+            let rezero = temperature::rezero(temperature, dataset, is_refitted);
+            out.findings.extend(rezero);
+            Basis::Blob { is_for_service }
         }
-    });
+    };
+    out.conclude(basis);
     out
 }

@@ -1,12 +1,13 @@
 //! What a fit says of itself, as findings.
 
-use super::bank;
 use crate::fit::Fit;
-use crate::judge::identify::check_described;
+use crate::judge::identify::{FitFailure, check_described};
+use crate::judge::predicted::Predicted;
 use crate::judge::statistics;
-use crate::judge::verdict::Predicted;
+use crate::judge::verdict;
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Finding, Kind, Place, Severity};
 use runtime::ModelKind;
 
 /// A fault in this part of the rows, or one that makes noise or a period so much larger, is worth a warning, ...
@@ -31,18 +32,17 @@ pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let severity = severity(left_out.share());
     let (first, last) = left_out.span.filter(|_| severity > Severity::Note)?;
     let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
-    let message = format!(
-        "{} of {} rows ({:.1} %), from movement {from}, t_us = {}, to movement {to}, t_us = {}, are so far from the fitted \
-         model that they count little or nothing in the fit: {} (--loss none lets every row count)",
-        left_out.rows,
-        left_out.of,
-        100.0 * left_out.share(),
-        first.t_us,
-        last.t_us,
-        Code::LeftOut.entry().remedy,
-    );
-    let found = Finding::new(Code::LeftOut, message).severe(severity);
-    Some(found.at(from, first.t_us).of(left_out.rows as f64, "rows"))
+    let end = Place {
+        movement: to,
+        t_us: last.t_us,
+    };
+    let kind = Kind::LeftOut {
+        rows: left_out.rows,
+        of: left_out.of,
+        end,
+    };
+    let found = Finding::new(kind).with_severity(severity);
+    Some(found.with_place(from, first.t_us))
 }
 
 /// Whether the errors of a model with zero deviations are too small, for each fits a row of its movement.
@@ -56,16 +56,12 @@ pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Fi
     };
     let mean = rows as f64 / movements.len().max(1) as f64;
     let shown = (1.0 - 1.0 / mean).max(0.0).sqrt();
-    let severity = bank::severity(1.0 / shown);
-    (severity > Severity::Note).then(|| {
-        let message = format!(
-            "the movements have {mean:.1} rows on the mean, and each has a zero deviation of its own, which fits one of them \
-             whatever the calibration is: the errors come out too small by about {:.0} %. Check the times and the movement \
-             column; a log without one begins a movement after every gap of more than ten rows",
-            100.0 * (1.0 - shown),
-        );
-        Finding::new(Code::ShortMovements, message).severe(severity).of(mean, "rows")
-    })
+    let severity = verdict::severity(1.0 / shown);
+    let kind = Kind::ShortMovements {
+        mean_rows: mean,
+        hidden: 1.0 - shown,
+    };
+    (severity > Severity::Note).then(|| Finding::new(kind).with_severity(severity))
 }
 
 /// Why a fit is not the field model, and what it is good for; a warning where its errors are so many times their
@@ -75,30 +71,40 @@ pub(super) fn not_field(
     predicted: Option<&Predicted>,
     unexplained: Option<f64>,
 ) -> Option<Finding> {
-    let mut message = fit.model_reason.clone();
-    if let Some(predicted) = predicted {
-        let um = predicted.range.map(|ends| ends.map(|end| end * 1e6));
-        let [x, y, rz] = um.map(|[low, high]| format!("{low:.1} to {high:.1}"));
-        message += &format!(
-            ". It is good on movements like those of the log; in service expect {x} um in X, {y} um in Y, {rz} urad in Rz"
-        );
-    }
-    let unexplained = unexplained.filter(|ratio| *ratio > ERROR_TO_NOISE_MAX);
-    if let Some(ratio) = unexplained {
-        message += &format!(
-            ". Its errors are {ratio:.1} times the noise from sample to sample: something in the log is not in the model. With \
-             all six axes moving at once take --model field or auto; else see the errors over the log in the report"
-        );
-    }
-    let severity = unexplained.map_or(Severity::Note, |_| Severity::Warn);
-    let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
-    (fit.model.kind != ModelKind::Field).then_some(lacks)
+    let over_noise = unexplained.filter(|ratio| *ratio > ERROR_TO_NOISE_MAX);
+    let severity = over_noise.map_or(Severity::Note, |_| Severity::Warn);
+    let kind = Kind::OtherModel {
+        reason: fit.model_reason.clone(),
+        in_service: predicted.map(|predicted| predicted.range),
+        over_noise,
+    };
+    let found = Finding::new(kind).with_severity(severity);
+    (fit.model.kind != ModelKind::Field).then_some(found)
 }
 
 /// A fit that leaves most of the motion unexplained and was kept all the same.
 pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let failure = check_described(dataset, &fit.sound, fit.model).err()?;
-    Some(Finding::new(Code::ModelLacks, failure.to_string()).severe(Severity::Refuse))
+    let FitFailure::NotDescribed {
+        model,
+        motion,
+        error_micro,
+        motion_micro,
+    } = failure
+    else {
+        return None;
+    };
+    let kind = Kind::NotDescribed {
+        model,
+        error: error_micro * 1e-6,
+        motion: motion_micro * 1e-6,
+    };
+    let axis = Channel::POSE[motion as usize];
+    Some(
+        Finding::new(kind)
+            .with_channel(axis)
+            .with_severity(Severity::Refuse),
+    )
 }
 
 /// rms errors of a fit over their noise from sample to sample, of the worst axis.

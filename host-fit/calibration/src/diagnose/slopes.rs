@@ -5,23 +5,6 @@ use hallstage_solver::solve::field::probe::Probe;
 use nalgebra::{Matrix3, Vector3};
 use runtime::capacitive::vertical_per_gap;
 
-/// Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
-pub(super) const CHANNELS: [&str; 9] = [
-    "hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3",
-];
-
-/// What a channel, or all of a kind, is called in a message.
-pub(super) fn title(channel: &str) -> String {
-    match channel.split_once('_') {
-        Some(("hall", probe)) => format!("Hall {}", probe.to_uppercase()),
-        Some(("cap", gap)) => format!("capacitive sensor {gap}"),
-        Some((_, beam)) => format!("beam {}", beam.to_uppercase()),
-        None if channel == "hall" => "all Hall probes".to_owned(),
-        None if channel == "cap" => "all capacitive sensors".to_owned(),
-        None => "all beams".to_owned(),
-    }
-}
-
 /// The probes, and the poses that errors of the reference and of the gaps make.
 pub(super) struct Slopes {
     probes: [Probe; 3],
@@ -43,7 +26,7 @@ impl Slopes {
         }
     }
 
-    /// Changes of the residuals of A, B, C by an error of each of [`CHANNELS`] at a pose, both in mm.
+    /// Changes of the residuals of A, B, C by an error of each of [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE) at a pose, both in mm.
     pub(super) fn at(&self, planar_mm: [f64; 3], vertical: [f64; 3]) -> [Vector3<f64>; 9] {
         let here = self.probes.map(|probe| probe.read(planar_mm, vertical));
         let by_beam = Matrix3::from_fn(|k, axis| here[k].by_pose[axis]) * self.by_beam;

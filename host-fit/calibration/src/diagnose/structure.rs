@@ -8,12 +8,12 @@
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
 use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
-use super::mistakes::{Change, Mistake, cure, mistakes};
+use super::mistakes::{Change, Mistake, cause, mistakes};
 use super::range::SPANS;
 use crate::judge::identify::check_motion;
 use crate::judge::lag::ALIKE_S;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::problem::parameters::Parameters;
@@ -75,14 +75,20 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let least = ranked.first()?.0;
     let gain = as_logged - least;
     if least > SOUND_MAX || gain < likely {
-        return (as_logged > SOUND_MAX).then(|| unexplained(as_logged));
+        return (as_logged > SOUND_MAX).then(|| {
+            let tolerances = (as_logged / SOUND_MAX).sqrt();
+            Finding::new(Kind::OtherProbes { tolerances })
+        });
     }
     let near = ranked
         .iter()
         .take_while(|(rank, _)| *rank < least + UNDECIDED);
     let mut named: Vec<Vec<&Mistake>> = Vec::new();
     for (_, mistake) in near {
-        match named.iter_mut().find(|alike| alike[0].what == mistake.what) {
+        match named
+            .iter_mut()
+            .find(|alike| alike[0].correction == mistake.correction)
+        {
             Some(alike) => alike.push(mistake),
             None => named.push(vec![mistake]),
         }
@@ -91,65 +97,27 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
 }
 
 fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
-    let cures: Vec<String> = named.iter().map(|alike| cure(alike)).collect();
-    let is_rough = named.iter().any(|alike| alike[0].value.is_some());
-    let magnets = named.iter().any(|alike| alike[0].may_be_magnets);
-    let (undecided, remedy) = match named {
-        [one] if !magnets => ("", one[0].code.entry().remedy),
-        _ => (
-            " (the log does not tell which)",
-            "find out which before anything is changed: check wiring, columns, units and stage.toml",
-        ),
-    };
+    let may_be_magnets = named.iter().any(|alike| alike[0].may_be_magnets);
+    let found = Finding::new(Kind::Mistake {
+        code: named[0][0].code,
+        causes: named.iter().map(|alike| cause(alike)).collect(),
+        is_sure,
+        may_be_magnets,
+    });
     // Other magnets are no mistake.
-    let severe = if magnets {
-        Severity::Warn
-    } else {
-        Severity::Refuse
+    let severity = match is_sure && !may_be_magnets {
+        true => Severity::Refuse,
+        false => Severity::Warn,
     };
-    let (what, severity) = match is_sure {
-        true => (
-            "the log is not that of the stage in stage.toml as it is, and fits",
-            severe,
-        ),
-        false => (
-            "the log may be of one stage all the same, but not of that in stage.toml as it is: it would fit",
-            Severity::Warn,
-        ),
+    let channels = match named {
+        [alike] => alike[0].correction.channels(),
+        _ => Vec::new(),
     };
-    let cures = cures.join(", or if ");
-    let cures = match magnets {
-        true => format!(
-            "{cures}, or if the field of the magnets falls so much faster with the height than designed"
-        ),
-        false => cures,
-    };
-    let rough = match is_rough {
-        true => ". The figures are rough: find the exact ones and write those",
-        false => "",
-    };
-    let message = format!("{what} if {cures}{undecided}: {remedy}{rough}");
-    let found = Finding::new(named[0][0].code, message).severe(severity);
-    match named {
-        [one] => {
-            let found = found.on(one[0].channel.clone());
-            match one[0].value {
-                Some((value, unit)) => found.of(value, unit.trim()),
-                None => found,
-            }
-        }
-        _ => found,
+    Finding {
+        channels,
+        severity,
+        ..found
     }
-}
-
-fn unexplained(distance: f64) -> Finding {
-    let message = format!(
-        "the fitted probes are not those of stage.toml ({:.1} times the tolerances of directions, sensitivities and places), and no \
-         single mistake with channels, signs, scales or places explains it: check order and signs of all channels, the scales \
-         and the designed values in stage.toml",
-        (distance / SOUND_MAX).sqrt()
-    );
-    Finding::new(Code::TermsAtLimit, message)
 }
 
 /// What the drawing says of the probes: one of each in its turn.

@@ -1,6 +1,7 @@
 //! Every mistake is named by itself, or beside what a log cannot tell it from.
 
 use super::structure::structure;
+use crate::words::message;
 use hallstage_input::finding::{Code, Severity};
 use hallstage_input::shipped::STAGE_TOML;
 use hallstage_input::stage::Stage;
@@ -64,7 +65,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
         ),
         (
             Code::ChannelInverted,
-            &["the sign of Hall B is turned"],
+            &["the sign of Hall B is inverted"],
             |s| s.hall[1] = -s.hall[1],
         ),
         (
@@ -72,9 +73,11 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
             &["beam Y1 and beam Y2 are exchanged"],
             |s| s.beams_nm.swap(1, 2),
         ),
-        (Code::BeamInverted, &["the sign of beam X is turned"], |s| {
-            s.beams_nm[0] = -s.beams_nm[0]
-        }),
+        (
+            Code::BeamInverted,
+            &["the sign of beam X is inverted"],
+            |s| s.beams_nm[0] = -s.beams_nm[0],
+        ),
         (
             Code::CapacitiveSwapped,
             &[
@@ -126,18 +129,22 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
             let dataset = recording.dataset(&stage).expect("a triangle");
             let found = structure(&dataset, &stage, false).expect("a finding");
             assert_eq!(
-                (found.code, found.severity),
+                (found.code(), found.severity),
                 (code, Severity::Refuse),
                 "{found:?}"
             );
             for cure in cures {
-                assert!(found.message.contains(cure), "{cure}: {}", found.message);
+                assert!(
+                    message(&found).contains(cure),
+                    "{cure}: {}",
+                    message(&found)
+                );
             }
             assert_eq!(
-                found.message.matches(", or if ").count(),
+                message(&found).matches(", or if ").count(),
                 cures.len() - 1,
                 "{}",
-                found.message
+                message(&found)
             );
         }
     }
@@ -177,7 +184,11 @@ fn a_mistake_in_the_stage_file_is_named() {
         for recording in recordings() {
             let dataset = recording.dataset(&stage).expect("a triangle");
             let found = structure(&dataset, &stage, false).expect("a finding");
-            assert!(found.message.contains(cure), "{cure}: {}", found.message);
+            assert!(
+                message(&found).contains(cure),
+                "{cure}: {}",
+                message(&found)
+            );
         }
     }
 }
@@ -210,9 +221,9 @@ fn scales_near_one_are_named_with_what_may_be_the_cause_as_well() {
         recording.movements.iter_mut().flatten().for_each(scale);
         let dataset = recording.dataset(&stage).expect("a triangle");
         let found = structure(&dataset, &stage, false).expect("a finding");
-        assert_eq!((found.code, found.severity), (Code::ScaleWrong, severity));
+        assert_eq!((found.code(), found.severity), (Code::ScaleWrong, severity));
         for cause in causes {
-            assert!(found.message.contains(cause), "{}", found.message);
+            assert!(message(&found).contains(cause), "{}", message(&found));
         }
     }
 }
@@ -230,7 +241,7 @@ fn places_of_the_hall_probes_at_twice_the_distance_are_named() {
         }
         let found = structure(&dataset, &stage, false).expect("a finding");
         let cure = "the places of the Hall probes are multiplied by about 2.0";
-        assert!(found.message.contains(cure), "{}", found.message);
+        assert!(message(&found).contains(cure), "{}", message(&found));
     }
 }
 
@@ -246,12 +257,12 @@ fn a_mistake_is_more_likely_where_nothing_else_describes_the_log() {
     assert_eq!(structure(&dataset, &stage, false), None);
     let found = structure(&dataset, &stage, true).expect("a finding");
     assert_eq!(
-        (found.code, found.severity),
+        (found.code(), found.severity),
         (Code::ScaleWrong, Severity::Warn)
     );
     assert!(
-        found.message.contains("sensors are multiplied by"),
+        message(&found).contains("sensors are multiplied by"),
         "{}",
-        found.message
+        message(&found)
     );
 }

@@ -1,12 +1,12 @@
 //! What a calibration knows of temperature: k and h, what a drift in the log costs, how far from the
 //! temperature of its log it is good, and when to zero again.
 
-use super::bank::{declared_service, severity};
 use crate::fit::Fit;
+use crate::judge::predicted::declared_service;
 use crate::judge::statistics::white_noise;
-use crate::judge::verdict::Validity;
+use crate::judge::verdict::severity;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::posterior::covariance_at;
@@ -19,8 +19,6 @@ use runtime::real::Real;
 /// stage is zeroed again.
 const REZERO_K: f64 = 5.0;
 
-/// The sensors, the symbols of their coefficients, and the part of the stage that these describe.
-const SENSORS: [(&str, &str, &str); 2] = [("mount", "k", "magnet"), ("body", "h", "hall")];
 /// A coefficient this many standard deviations from what the stage file expects has another cause.
 const DEVIATIONS_MAX: f64 = 4.0;
 /// Rows without a temperature, in parts of all, that k and h can bear.
@@ -63,57 +61,40 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
     };
     let there = (0..2).filter(|sensor| temperature.reach_mk[*sensor] != 0);
     let finding = |sensor: usize| {
-        let (place, symbol, part) = SENSORS[sensor];
-        let zero_c = f64::from(temperature.zero_mc[sensor]) * 1e-3;
-        let of_probe = |probe: usize| {
-            let percent = temperature.per_mk[probe][sensor] * 1e5;
-            let error = error_per_k[probe][sensor] * 1e2;
-            format!("{percent:.4}({error:.4})")
-        };
-        let values = [0, 1, 2].map(of_probe).join(", ");
-        let span_k = spans_k[sensor];
-        let from = if span_k > 0.0 {
-            format!("from logs {span_k:.1} K apart")
-        } else if fit.field.is_none() {
-            "as stage.toml expects, for only the field model fits it".to_owned()
-        } else {
-            "as stage.toml expects, for the temperature hardly changes: fit the log together with one that is 3 K away or \
-             more"
-                .to_owned()
+        let per_k = |probe: usize| {
+            let value = temperature.per_mk[probe][sensor] * 1e3;
+            [value, error_per_k[probe][sensor]]
         };
         let [expected, deviation] = stage.temperature.prior_per_k[sensor];
         let deviations = |probe: usize| {
-            let value = temperature.per_mk[probe][sensor] * 1e3;
-            ((value - expected) / deviation.hypot(error_per_k[probe][sensor])).abs()
+            let [value, error] = per_k(probe);
+            ((value - expected) / deviation.hypot(error)).abs()
         };
         let deviations = [0, 1, 2].map(deviations).into_iter().fold(0.0, f64::max);
+        let span_k = spans_k[sensor];
         let is_other = span_k > 0.0 && deviations > DEVIATIONS_MAX;
-        let other = if is_other {
-            format!(
-                ": {deviations:.0} standard deviations from what `{part}` in [temperature] expects; check the sensor, its column, \
-                 unit and sign, and `{part}`"
-            )
-        } else {
-            String::new()
-        };
-        let message = format!(
-            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {from}{other}"
-        );
-        let found = Finding::new(Code::Temperature, message).of(span_k, "K");
+        let found = Finding::new(Kind::Coefficients {
+            sensor,
+            percent_per_k: [0, 1, 2].map(|probe| per_k(probe).map(|x| 100.0 * x)),
+            zero_c: f64::from(temperature.zero_mc[sensor]) * 1e-3,
+            span_k,
+            is_field: fit.field.is_some(),
+            deviations: is_other.then_some(deviations),
+        });
         let found = match cost(sensor) {
-            Some(cost) => found.severe(severity(cost)).costing(cost),
+            Some(cost) => found.with_severity(severity(cost)).with_cost(cost),
             None => found,
         };
         // Wrong at any other temperature.
         match is_other {
-            true => found.severe(Severity::Refuse),
+            true => found.with_severity(Severity::Refuse),
             false => found,
         }
     };
     let incomplete = missing(temperature, dataset).map(|found| {
-        let share = found.value.unwrap_or(0.0) / dataset.rows.len() as f64;
+        let share = found.value().unwrap_or(0.0) / dataset.rows.len() as f64;
         match share > MISSING_MAX {
-            true => found.severe(Severity::Refuse),
+            true => found.with_severity(Severity::Refuse),
             false => found,
         }
     });
@@ -125,16 +106,17 @@ pub(super) fn missing<T: Real>(temperature: &Temperature<T>, dataset: &Dataset) 
     let mut rows =
         (dataset.rows.iter()).filter(|row| !temperature.is_plausible(row.frame.temperature_mc()));
     let first = rows.next()?;
-    let count = 1 + rows.count();
-    let message = format!(
-        "{count} of {} rows have no temperature, or one more than {} K from that of the calibration, and count as if at that: check \
-         the columns of [temperature], their unit and the sensors",
-        dataset.rows.len(),
-        Temperature::<T>::REACH_MK / 1000,
-    );
+    let found = Finding::new(Kind::NoTemperature {
+        rows: 1 + rows.count(),
+        of: dataset.rows.len(),
+        reach_k: Temperature::<T>::REACH_MK / 1000,
+    });
     let name = dataset.movement_name(&dataset.movements[first.movement]);
-    let found = Finding::new(Code::Temperature, message).severe(Severity::Warn);
-    Some(found.at(name, first.t_us).of(count as f64, "rows"))
+    Some(
+        found
+            .with_severity(Severity::Warn)
+            .with_place(name, first.t_us),
+    )
 }
 
 /// rms distance of a sensor's temperature from T0 over the log, K.
@@ -149,23 +131,6 @@ fn drift_k(dataset: &Dataset, temperature: &Temperature<f64>, sensor: usize) -> 
         .map(|change| change * change)
         .sum();
     (squares / dataset.rows.len().max(1) as f64).sqrt()
-}
-
-/// How far from the temperature of its calibration a stage stays good; `covariance` is a
-/// [`Posterior::covariance`](hallstage_solver::solve::field::posterior::Posterior::covariance).
-pub fn validity(
-    stage: &Stage,
-    parameters: &FieldParameters,
-    white_mm: [f64; 3],
-    covariance: &DMatrix<f64>,
-) -> Option<Validity> {
-    let service = declared_service(stage, parameters, white_mm)?;
-    Some(Validity::new(
-        &service,
-        parameters,
-        covariance,
-        &stage.temperature,
-    ))
 }
 
 /// That the temperature changed, in a log that a blob is judged on, by more than a zero holds: since the
@@ -191,32 +156,25 @@ pub fn rezero(
     let changes = all.filter_map(of_movement);
     let (change_k, movement, sensor) = changes.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (change_k > REZERO_K).then(|| {
-        let (place, ..) = SENSORS[sensor];
-        let since = if refitted { "within a movement" } else { "since the calibration" };
-        let message = format!(
-            "the temperature of the {place} changes by {change_k:.1} K {since}: zero the stage again after every {REZERO_K} K, for \
-             offsets and expansion are not in the model"
-        );
         let movement = &dataset.movements[movement];
         let t_us = dataset.rows[movement.rows.start].t_us;
-        let found = Finding::new(Code::Temperature, message).severe(Severity::Warn);
-        found.at(dataset.movement_name(movement), t_us).of(change_k, "K")
+        let found = Finding::new(Kind::TemperatureChange {
+            sensor,
+            change_k,
+            is_in_movement: refitted,
+            rezero_k: REZERO_K,
+        });
+        let found = found.with_severity(Severity::Warn);
+        found.with_place(dataset.movement_name(movement), t_us)
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::verdict::{GOOD_MAX, Predicted};
     use hallstage_input::dataset::{LoggedFrame, Movement, Row};
-    use hallstage_input::shipped::STAGE_TOML;
-    use hallstage_solver::problem::parameters::Parameters;
     use runtime::RawFrame;
     use runtime::frame::MISSING_CODE;
-
-    fn stage() -> Stage {
-        Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
-    }
 
     /// Two movements, at these temperatures of the mount, m degC.
     fn dataset(movements: [[i32; 2]; 2]) -> Dataset {
@@ -258,8 +216,10 @@ mod tests {
             ([[MISSING_CODE; 2]; 2], false, None),
         ] {
             let found = rezero(&temperature, &dataset(movements), refitted);
-            let found = found.map(|found| found.movement.expect("a movement"));
-            assert_eq!(found.as_deref(), movement, "{movements:?} {refitted}");
+            let found = found
+                .as_ref()
+                .map(|found| found.movement().expect("a movement"));
+            assert_eq!(found, movement, "{movements:?} {refitted}");
         }
     }
 
@@ -272,52 +232,12 @@ mod tests {
         };
         let dataset = dataset([[20_000, MISSING_CODE], [21_000, 293_000]]);
         let found = missing(&temperature, &dataset).expect("two");
-        assert_eq!(
-            (found.value, found.movement),
-            (Some(2.0), Some("0".to_owned()))
-        );
+        assert_eq!((found.value(), found.movement()), (Some(2.0), Some("0")));
         temperature.reach_mk = [0; 2];
         assert_eq!(
             missing(&temperature, &dataset),
             None,
             "no sensor, nothing missing"
-        );
-    }
-
-    /// Known exactly but for k, a stage is good while the error of k allows.
-    #[test]
-    fn a_calibration_is_good_while_k_is_known_well_enough() {
-        let (stage, white_mm) = (stage(), [5e-4; 3]);
-        let parameters = FieldParameters::of_model_31(&Parameters::designed(&stage), &stage);
-        let within = |error_per_k: f64| {
-            let mut covariance = DMatrix::zeros(COUNT + 6, COUNT + 6);
-            (0..3).for_each(|probe| {
-                let k = COUNT + 2 * probe;
-                covariance[(k, k)] = error_per_k * error_per_k;
-            });
-            let found = validity(&stage, &parameters, white_mm, &covariance);
-            found.expect("a service").within_k
-        };
-        let (rough, fine) = (within(3e-4), within(1e-4));
-        assert!((fine / rough - 3.0).abs() < 0.05, "{rough} {fine}");
-        assert_eq!(within(0.0), 30.0);
-        // At that distance the gain is off by as much as makes the errors so large.
-        let service = declared_service(&stage, &parameters, white_mm).expect("a service");
-        let mut covariance = DMatrix::zeros(COUNT, COUNT);
-        for probe in 0..3 {
-            let mut parts = [0.0; 3];
-            parts[probe] = 3e-4 * rough;
-            let by = DMatrix::from_column_slice(COUNT, 1, &parameters.by_gain(parts));
-            covariance += &by * by.transpose();
-        }
-        let ratio = Predicted::new(&service, &covariance, &[0.0; COUNT]).worst_ratio();
-        assert!((ratio - GOOD_MAX).abs() < 2e-3, "{ratio}");
-        // Without a sensor the whole effect of temperature is an error.
-        let blind = DMatrix::zeros(COUNT, COUNT);
-        let blind = validity(&stage, &parameters, white_mm, &blind).expect("a service");
-        assert!(
-            !blind.is_followed && blind.within_k < 0.3 * rough,
-            "{blind:?}"
         );
     }
 }

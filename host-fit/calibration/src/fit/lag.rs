@@ -48,7 +48,8 @@ pub(super) fn without_lag(
 }
 
 fn is_clear(found: &Fit, stage: &Stage) -> bool {
-    (found.lag.as_ref()).is_some_and(|lag| warning::of_lag(lag, stage.servo_period_s).is_some())
+    (found.lag.as_ref())
+        .is_some_and(|lag| warning::late_reference(lag, stage.servo_period_s).is_some())
 }
 
 /// Fits again until nothing of the lag of `found` is left.

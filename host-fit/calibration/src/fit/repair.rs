@@ -1,7 +1,7 @@
 //! A fit with the faults of its log taken off.
 
 use super::{Fit, FitError};
-use crate::judge::verdict::Predicted;
+use crate::judge::predicted::Predicted;
 use crate::judge::{Decoded, Zeros};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
@@ -19,8 +19,6 @@ pub struct Repair {
     pub parameters: FieldParameters,
     /// Their covariance, in their order and units.
     pub covariance: DMatrix<f64>,
-    /// The faults, in words.
-    pub faults: Vec<String>,
 }
 
 impl Fit {

@@ -22,6 +22,7 @@ mod judgement;
 pub mod lag;
 pub mod left_out;
 pub mod precision;
+pub mod predicted;
 pub mod spectrum;
 pub mod statistics;
 pub mod uncertainty;

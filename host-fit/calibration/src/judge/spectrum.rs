@@ -1,6 +1,6 @@
 //! Mean power spectra of signals and errors, and their lines.
 
-use super::verdict::quantile;
+use super::predicted::quantile;
 use hallstage_input::statistics::median;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;

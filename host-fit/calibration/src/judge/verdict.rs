@@ -1,201 +1,266 @@
-//! What a calibration is good for at work.
+//! The verdict: findings are ranked, and decide with the predicted errors whether a calibration can be used.
 
-use hallstage_input::finding::{Code, Finding, Severity};
-use hallstage_input::stage::TemperatureTable;
-use hallstage_solver::solve::field::carry::Service;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::posterior::covariance_at;
-use hallstage_solver::solve::field::terms::COUNT;
-use nalgebra::DMatrix;
-use runtime::Temperature;
-use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer};
+use super::predicted::Predicted;
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Code, Finding, Kind, Severity, Trust};
+use serde::Serialize;
 
-/// Errors at work over the noise floor up to which a calibration is good, ...
+/// Predicted errors in service over the noise floor up to which a fault is a note.
+const NOTE_MAX: f64 = 1.05;
+/// Predicted errors in service over the noise floor up to which a calibration is good.
 pub const GOOD_MAX: f64 = 1.10;
-/// ... and up to which it serves at all.
+/// Predicted errors in service over the noise floor up to which a calibration is of use at all.
 pub const LIMITED_MAX: f64 = 1.30;
-/// The ends of the range are where one of twenty stages is below, and one above: standard deviations.
-const END: f64 = 1.645;
-/// Mean squares of the errors of one calibration over services within the declared range, standard deviation
-/// over mean.
-const OF_MOTION: f64 = 0.7;
+
+/// The severity of a fault that makes these errors in service, over the noise floor.
+pub fn severity(ratio: f64) -> Severity {
+    match ratio {
+        ratio if ratio < NOTE_MAX => Severity::Note,
+        ratio if ratio < LIMITED_MAX => Severity::Warn,
+        _ => Severity::Refuse,
+    }
+}
 
 /// Whether a calibration can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// At work its errors are those of the sensors.
+    /// Its errors in service are the noise of the sensors.
     Good,
-    /// It serves with larger errors, or on movements like those of the log only.
+    /// Its errors in service are larger, or it is of use on movements like those of the log only.
     Limited,
     /// It is not to be used.
     Refused,
 }
 
-impl Verdict {
-    /// Of a calibration with these findings; `for_service` where its model describes service and its log
-    /// could show it.
-    pub fn new(for_service: bool, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
-        let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
-        // No prediction holds what contradicts the drawing or the model, nor what a probe or a gap that is late at work,
-        // too, makes of motion.
-        let is_doubtful = findings.iter().any(|f| {
-            let of_beams = f
-                .channel
-                .as_deref()
-                .is_none_or(|channel| channel.starts_with("ifm"));
-            let is_late = f.code == Code::ReferenceLag && !of_beams;
-            let of_model = matches!(
-                f.code,
-                Code::TermsAtLimit | Code::ModelLacks | Code::ScaleWrong
-            );
-            (of_model || is_late) && f.severity > Severity::Note
+/// The calibration on which findings are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// There is no fit to the log.
+    NoFit,
+    /// A fit to the log.
+    Fit {
+        /// Whether the model describes service, and the log alone determines it.
+        is_for_service: bool,
+    },
+    /// A blob that was recalibrated by the log.
+    Recalibrated,
+    /// A blob from another log.
+    Blob {
+        /// Whether the model describes service.
+        is_for_service: bool,
+    },
+}
+
+/// Findings without the consequences of others, the most severe first, and the verdict; it is `None` for a blob
+/// where the log cannot predict its errors.
+pub fn conclude(
+    mut findings: Vec<Finding>,
+    predicted: Option<&Predicted>,
+    basis: Basis,
+) -> (Vec<Finding>, Option<Verdict>) {
+    if let Basis::Blob { .. } = basis {
+        // A fault of the log bends a fit, not a blob.
+        for found in findings.iter_mut().filter(|found| found.cost.is_some()) {
+            found.severity = found.severity.min(Severity::Warn);
+        }
+    }
+    let is_cause = |found: &&Finding| !findings.iter().any(|cause| hides(cause, found));
+    let mut ranked: Vec<Finding> = findings.iter().filter(is_cause).cloned().collect();
+    ranked.sort_by_key(|found| std::cmp::Reverse(found.severity));
+    let ratio = predicted.map(Predicted::worst_ratio);
+    let verdict = match basis {
+        Basis::NoFit => Some(Verdict::Refused),
+        Basis::Fit { is_for_service } => {
+            if let Some(ratio) = ratio
+                && is_for_service
+                && ratio > LIMITED_MAX
+                && !is_refused(&ranked)
+            {
+                let together = Finding::new(Kind::FaultsTogether { ratio });
+                ranked.insert(0, together.with_cost(ratio));
+            }
+            Some(decide(&ranked, ratio, is_for_service))
+        }
+        Basis::Blob { is_for_service } => ratio.map(|_| decide(&ranked, ratio, is_for_service)),
+        Basis::Recalibrated => match decide(&ranked, ratio, true) {
+            // A fault bends the parameters that were found.
+            Verdict::Good if ranked.iter().any(|found| found.cost > Some(GOOD_MAX)) => {
+                Some(Verdict::Limited)
+            }
+            verdict => Some(verdict),
+        },
+    };
+    (ranked, verdict)
+}
+
+/// Whether a finding refuses the log.
+pub fn is_refused(findings: &[Finding]) -> bool {
+    findings
+        .iter()
+        .any(|found| found.severity == Severity::Refuse)
+}
+
+/// The verdict on findings and predicted errors over the noise floor.
+fn decide(findings: &[Finding], ratio: Option<f64>, is_for_service: bool) -> Verdict {
+    let is_doubtful = |found: &Finding| {
+        let is_lost = match found.code().entry().trust {
+            Trust::Kept => false,
+            Trust::Lost => true,
+            Trust::LostOfSensors => found.channels().iter().any(|channel| !channel.is_beam()),
+        };
+        is_lost && found.severity > Severity::Note
+    };
+    let ratio = ratio.unwrap_or(LIMITED_MAX);
+    match (is_refused(findings), is_for_service) {
+        (true, _) => Verdict::Refused,
+        (false, true) if ratio <= GOOD_MAX && !findings.iter().any(is_doubtful) => Verdict::Good,
+        (false, true) if ratio > LIMITED_MAX => Verdict::Refused,
+        // What other models lack is no fault of the log.
+        _ => Verdict::Limited,
+    }
+}
+
+/// Whether `found` is a consequence of `cause`.
+fn hides(cause: &Finding, found: &Finding) -> bool {
+    if cause.severity == Severity::Note {
+        return false;
+    }
+    // Another refusal says more than that the model does not describe the log, and the whole fit to a refused log
+    // is wrong.
+    if cause.severity == Severity::Refuse && cause.code() != found.code() {
+        match found.code() {
+            Code::ModelLacks => return true,
+            Code::TermsAtLimit if found.severity < Severity::Refuse => return true,
+            _ => {}
+        }
+    }
+    if !cause.code().entry().hides.contains(&found.code()) {
+        return false;
+    }
+    let is_pose = |of: &Finding| of.channels().iter().any(|channel| channel.is_pose());
+    let is_same_movement = cause.movement() == found.movement();
+    match found.code() {
+        // Movements that reach the end of a converter's range look like movements of another stage.
+        Code::LogsDisagree => found.place.is_some(),
+        _ if found.severity > cause.severity => false,
+        // Rows of a channel explain a wild row of the pose.
+        Code::Outliers => is_pose(found) && !is_pose(cause),
+        // Where a channel stops and goes on, others seem to jump.
+        Code::Step => is_same_movement && found.channels() != cause.channels(),
+        Code::ZeroClipped => cause.place.is_none() || is_same_movement,
+        // A line in the spectrum of a beam looks like a lag.
+        Code::ReferenceLag => cause
+            .channels()
+            .iter()
+            .any(|channel: &Channel| channel.is_beam()),
+        _ => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hallstage_input::finding::{Quantity, TimeCourse};
+
+    fn change(quantity: Quantity, course: TimeCourse, channel: Channel) -> Finding {
+        let kind = Kind::Change {
+            quantity,
+            course,
+            size: 1.0,
+        };
+        Finding::new(kind).with_channel(channel)
+    }
+
+    fn ranked(findings: Vec<Finding>) -> Vec<Finding> {
+        conclude(findings, None, Basis::NoFit).0
+    }
+
+    #[test]
+    fn a_cause_stays_and_its_consequences_go() {
+        let step = change(Quantity::Zero, TimeCourse::Onset, Channel::BeamY1);
+        let wild = Finding::new(Kind::WildRow {
+            micro: 1.0,
+            unit: "urad",
+            ratio: 9.0,
         });
-        let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
-        match (is_refused, for_service) {
-            (true, _) => Self::Refused,
-            (false, true) if ratio <= GOOD_MAX && !is_doubtful => Self::Good,
-            (false, true) if ratio > LIMITED_MAX => Self::Refused,
-            // What other models lack is no fault of the log.
-            _ => Self::Limited,
-        }
+        let wild = wild.with_channel(Channel::Rz);
+        let rows = Finding::new(Kind::OutlierRows {
+            rows: 1,
+            largest_m: 1e-5,
+        });
+        let rows = rows.with_channel(Channel::HallA);
+        let lag = change(Quantity::Time, TimeCourse::Constant, Channel::Beams);
+        let all = vec![step.clone(), wild.clone(), rows.clone(), lag.clone()];
+        assert_eq!(ranked(all), [step, rows, lag.clone()]);
+        let alone = vec![wild];
+        assert_eq!(ranked(alone.clone()), alone);
+        let hum = Finding::new(Kind::Hum {
+            frequency_hz: 50.0,
+            amplitude_m: 1e-6,
+        });
+        let of_beam = hum.clone().with_channel(Channel::BeamX);
+        assert_eq!(ranked(vec![of_beam.clone(), lag.clone()]), [of_beam]);
+        let apart = vec![hum.with_channel(Channel::HallA), lag];
+        assert_eq!(ranked(apart.clone()), apart);
     }
-}
 
-/// Errors of X, Y, Rz that are predicted for service over the range that `[motion]` declares.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Predicted {
-    /// rms: m, m, rad.
-    pub rms: [f64; 3],
-    /// The same over the noise floor, which is that of the probes.
-    pub ratio: [f64; 3],
-    /// Nine of ten stages with such a log have an rms between these: m, m, rad.
-    pub range: [[f64; 2]; 3],
-}
+    #[test]
+    fn a_refusal_hides_warnings_and_what_the_model_lacks_but_no_other_refusal() {
+        let refused = |kind| Finding::new(kind).with_severity(Severity::Refuse);
+        let swapped = refused(Kind::Mistake {
+            code: Code::ChannelsSwapped,
+            causes: Vec::new(),
+            is_sure: true,
+            may_be_magnets: false,
+        });
+        let (other, lacks) = (
+            refused(Kind::OtherState { log: None }),
+            refused(Kind::ChangesOften {}),
+        );
+        let limits = Finding::new(Kind::VerticalAtLimit { parameters: 2 });
+        let all = vec![swapped.clone(), limits, other.clone(), lacks.clone()];
+        assert_eq!(ranked(all), [swapped, other]);
+        assert_eq!(ranked(vec![lacks.clone()]), [lacks]);
+    }
 
-impl Predicted {
-    /// Of parameters that are `off` the best estimate, which has this covariance.
-    pub fn new(service: &Service, covariance: &DMatrix<f64>, off: &[f64]) -> Self {
-        let variance = service.variance(covariance);
-        let known = service.squares(off);
-        let spread = service.spread(covariance, off);
-        let rms =
-            |axis: usize| (variance.noise[axis] + variance.systematic[axis] + known[axis]).sqrt();
-        let range = |axis: usize| {
-            let mean = variance.systematic[axis] + known[axis];
-            let spread = spread[axis] + (OF_MOTION * mean) * (OF_MOTION * mean);
-            [-END, END].map(|end| (variance.noise[axis] + quantile(mean, spread, end)).sqrt())
+    #[test]
+    fn what_no_prediction_holds_keeps_a_verdict_from_good() {
+        let good = Predicted {
+            rms: [1e-6; 3],
+            ratio: [1.0; 3],
+            range: [[1e-6; 2]; 3],
         };
-        let rms = [0, 1, 2].map(rms);
-        Self {
-            rms,
-            ratio: [0, 1, 2].map(|axis| rms[axis] / variance.noise[axis].sqrt()),
-            range: [0, 1, 2].map(range),
-        }
-    }
-
-    /// The ratio of the worst axis.
-    pub fn worst_ratio(&self) -> f64 {
-        self.ratio.into_iter().fold(0.0, f64::max)
-    }
-}
-
-/// How far from the temperature of its log a calibration is good; all parts change alike.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Validity {
-    /// Errors at work are at most [`GOOD_MAX`] times the noise floor within this distance, K.
-    pub within_k: f64,
-    /// Whether the calibration follows temperature; without sensors the distance is an estimate by what is
-    /// known of the parts.
-    pub is_followed: bool,
-}
-
-impl Validity {
-    /// Of a calibration at a service.
-    pub fn new(
-        service: &Service,
-        parameters: &FieldParameters,
-        covariance: &DMatrix<f64>,
-        table: &TemperatureTable,
-    ) -> Self {
-        let is_followed = covariance.nrows() > COUNT;
-        let [k, h] = table.prior_per_k;
-        let mut covariance = covariance.clone();
-        if !is_followed {
-            covariance.resize_mut(COUNT + 6, COUNT + 6, 0.0);
-            for (place, [_, deviation]) in (COUNT..).zip([k, h, k, h, k, h]) {
-                covariance[(place, place)] = deviation * deviation;
-            }
-        }
-        let off_per_k = if is_followed { 0.0 } else { k[0] + h[0] };
-        let is_good = |change_k: f64| {
-            let off = parameters.by_gain([off_per_k * change_k; 3]);
-            let covariance = covariance_at(&covariance, parameters, [change_k; 2]);
-            Predicted::new(service, &covariance, &off).worst_ratio() <= GOOD_MAX
+        let verdict = |findings, basis| conclude(findings, Some(&good), basis).1;
+        let fit = Basis::Fit {
+            is_for_service: true,
         };
-        let [mut good, mut bad] = [0.0, f64::from(Temperature::<f64>::REACH_MK) * 1e-3];
-        if is_good(bad) {
-            good = bad;
-        }
-        // To a hundredth of a kelvin.
-        for _ in 0..12 {
-            let middle = 0.5 * (good + bad);
-            if is_good(middle) {
-                good = middle;
-            } else {
-                bad = middle;
-            }
-        }
-        Self {
-            within_k: good,
-            is_followed,
-        }
-    }
-}
-
-/// The quantile, this many standard deviations from the middle, of a sum of squares with this mean and
-/// variance: as of a chi-square with as many degrees of freedom, by Wilson and Hilferty.
-pub(crate) fn quantile(mean: f64, variance: f64, deviations: f64) -> f64 {
-    if mean <= 0.0 {
-        return 0.0;
-    }
-    let part = variance / (9.0 * mean * mean);
-    mean * (1.0 - part + deviations * part.sqrt()).max(0.0).powi(3)
-}
-
-/// By axis `rms_um` or `rms_urad`, `ratio` and the range of the rms, and `worst_ratio`.
-impl Serialize for Predicted {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Um {
-            rms_um: f64,
-            ratio: f64,
-            range_um: [f64; 2],
-        }
-        #[derive(Serialize)]
-        struct Urad {
-            rms_urad: f64,
-            ratio: f64,
-            range_urad: [f64; 2],
-        }
-        let [x, y, rz] = self.rms.map(|rms| rms * 1e6);
-        let [of_x, of_y, of_rz] = self.range.map(|range| range.map(|end| end * 1e6));
-        let um = |axis: usize, rms_um, range_um| Um {
-            rms_um,
-            ratio: self.ratio[axis],
-            range_um,
+        assert_eq!(verdict(vec![], fit), Some(Verdict::Good));
+        let late = |channel| change(Quantity::Time, TimeCourse::Constant, channel);
+        assert_eq!(
+            verdict(vec![late(Channel::BeamX)], fit),
+            Some(Verdict::Good)
+        );
+        assert_eq!(
+            verdict(vec![late(Channel::HallB)], fit),
+            Some(Verdict::Limited)
+        );
+        let limits = || Finding::new(Kind::VerticalAtLimit { parameters: 2 });
+        assert_eq!(verdict(vec![limits()], fit), Some(Verdict::Limited));
+        let costly = || {
+            late(Channel::BeamX)
+                .with_severity(Severity::Refuse)
+                .with_cost(2.0)
         };
-        let rz = Urad {
-            rms_urad: rz,
-            ratio: self.ratio[2],
-            range_urad: of_rz,
+        assert_eq!(verdict(vec![costly()], fit), Some(Verdict::Refused));
+        assert_eq!(
+            verdict(vec![costly()], Basis::Recalibrated),
+            Some(Verdict::Refused)
+        );
+        let blob = Basis::Blob {
+            is_for_service: true,
         };
-        let mut map = serializer.serialize_map(Some(4))?;
-        map.serialize_entry("x", &um(0, x, of_x))?;
-        map.serialize_entry("y", &um(1, y, of_y))?;
-        map.serialize_entry("rz", &rz)?;
-        map.serialize_entry("worst_ratio", &self.worst_ratio())?;
-        map.end()
+        assert_eq!(verdict(vec![costly()], blob), Some(Verdict::Good));
+        assert_eq!(conclude(vec![], None, blob).1, None);
     }
 }

@@ -1,20 +1,17 @@
-//! Rows that were left out, as the user asked: how many, why, and the first of each reason.
+//! Rows that are skipped because the user asked for it: how many, why, and the first of each reason.
 
 use super::cell::CellFault;
 use super::error::{LogError, LogProblem, Place};
-use crate::finding::{Code, Finding};
+use crate::finding::{Finding, Kind};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// So many movements of which nothing is left are named.
-const MOVEMENTS_NAMED: usize = 10;
-
-/// The rows of one log that were left out.
+/// The skipped rows of one log.
 #[derive(Debug, Default)]
 pub(super) struct Skipped {
-    /// By reason: the first fault, and how many rows.
+    /// By reason: the first fault, its place, and how many rows.
     reasons: Vec<(CellFault, Box<Place>, usize)>,
-    /// Movements of which no row was kept yet, and how many were left out.
+    /// Movements without a row that is kept, and how many rows of each are skipped.
     lost: BTreeMap<i64, usize>,
     /// The movement of the last row that was kept.
     kept: Option<i64>,
@@ -39,12 +36,12 @@ impl Skipped {
         }
     }
 
-    /// How many rows were left out.
+    /// How many rows are skipped.
     pub(super) fn rows(&self) -> usize {
         self.reasons.iter().map(|(.., rows)| rows).sum()
     }
 
-    /// A log of which nothing is left: why, or that it had no rows at all.
+    /// A log without a row that is kept: why, or that it has no rows at all.
     pub(super) fn nothing_left(self, path: &Path, header_line: usize) -> LogError {
         let rows = self.rows();
         match self.reasons.into_iter().next() {
@@ -62,37 +59,27 @@ impl Skipped {
         self.lost.remove(&movement);
     }
 
-    /// What the user should know.
-    pub(super) fn warnings(self, path: &Path) -> Vec<Finding> {
-        let mut warnings: Vec<Finding> = Vec::new();
-        for (fault, first, rows) in &self.reasons {
-            let line = first.line.unwrap_or_default();
+    /// Why rows are skipped, and which movements are lost.
+    pub(super) fn findings(self, file: &str) -> Vec<Finding> {
+        let reason = |(fault, first, rows): &(CellFault, Box<Place>, usize)| {
             let (column, name) = first.column.clone().unwrap_or_default();
-            let message = format!(
-                "{}: rows left out for {}: {rows} (the first: line {}, column {}, {})",
-                path.display(),
-                fault.reason(),
-                line,
+            Finding::new(Kind::RowsSkipped {
+                file: file.to_owned(),
+                reason: fault.reason(),
+                rows: *rows,
+                line: first.line.unwrap_or_default(),
                 column,
-                name
-            );
-            warnings.push(Finding::new(Code::RowsSkipped, message).of(*rows as f64, "rows"));
-        }
-        if !self.lost.is_empty() {
-            let rows: usize = self.lost.values().sum();
-            let named = self.lost.keys().take(MOVEMENTS_NAMED).map(i64::to_string);
-            let others = match self.lost.len().saturating_sub(MOVEMENTS_NAMED) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            let message = format!(
-                "{}: all rows of movement {}{others} are bad ({rows}), so nothing of it is left; record it again if its \
-                 setting matters",
-                path.display(),
-                named.collect::<Vec<_>>().join(", "),
-            );
-            warnings.push(Finding::new(Code::RowsSkipped, message).of(rows as f64, "rows"));
-        }
-        warnings
+                name,
+            })
+        };
+        let reasons = self.reasons.iter().map(reason);
+        let lost = (!self.lost.is_empty()).then(|| {
+            Finding::new(Kind::MovementsSkipped {
+                file: file.to_owned(),
+                movements: self.lost.keys().copied().collect(),
+                rows: self.lost.values().sum(),
+            })
+        });
+        reasons.chain(lost).collect()
     }
 }

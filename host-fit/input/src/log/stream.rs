@@ -2,14 +2,13 @@
 
 use super::error::{LogError, LogProblem, Place};
 use super::header;
-use super::order::{Order, OrderCells};
+use super::order::{GAP_PERIODS, Order, OrderCells};
 use super::rows::{BadCell, RowReader};
 use super::skipped::Skipped;
 use super::table::Table;
-use super::warning::{between_codes, by_time, file_cut, single_rows};
 use super::{BadRows, ReadOptions, SaturatedCodes};
 use crate::dataset::Row;
-use crate::finding::Finding;
+use crate::finding::{Finding, Kind};
 use crate::progress::Progress;
 use crate::stage::Stage;
 use crate::text::TextReader;
@@ -172,16 +171,32 @@ impl<'a> LogRows<'a> {
         }
         let columns = &self.reader.columns;
         let mut warnings = Vec::new();
-        let open_line = self.table.open_line;
-        warnings.extend(open_line.map(|line| file_cut(path, line)));
-        if columns.movement.is_none() {
-            warnings.push(by_time(path, order.movements, self.options.split_s));
+        let file = path.display().to_string();
+        if let Some(line) = self.table.open_line {
+            let file = file.clone();
+            warnings.push(Finding::new(Kind::FileCut { file, line }));
         }
-        let mean = self.reader.between_codes();
-        warnings.extend((mean > BETWEEN_CODES).then(|| between_codes(path, mean)));
-        warnings.extend(self.skipped.warnings(path));
-        let single = order.end_movement();
-        warnings.extend(single.map(|(first, count)| single_rows(path, first, count)));
+        if columns.movement.is_none() {
+            warnings.push(Finding::new(Kind::MovementsByTime {
+                file: file.clone(),
+                movements: order.movements,
+                split_s: self.options.split_s,
+                gap_rows: GAP_PERIODS as i64,
+            }));
+        }
+        let mean_codes = self.reader.between_codes();
+        if mean_codes > BETWEEN_CODES {
+            let file = file.clone();
+            warnings.push(Finding::new(Kind::BetweenCodes { file, mean_codes }));
+        }
+        warnings.extend(self.skipped.findings(&file));
+        if let Some((first, movements)) = order.end_movement() {
+            warnings.push(Finding::new(Kind::SingleRows {
+                file,
+                first,
+                movements,
+            }));
+        }
         Ok(LogEnd {
             skipped_rows,
             has_reference: columns.reference.is_some(),

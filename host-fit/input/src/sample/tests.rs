@@ -88,7 +88,7 @@ fn of_a_long_log_runs_are_kept_as_they_are() {
     );
     let found: Vec<_> = warnings
         .iter()
-        .map(|found| (found.code, found.value))
+        .map(|found| (found.code(), found.value()))
         .collect();
     assert_eq!(found, [(Code::Excerpt, Some(taken as f64))]);
     for (number, run) in dataset.movements.iter().enumerate() {

@@ -1,7 +1,9 @@
 //! The bank: what a fault of each channel does to the signals.
 
 use super::means::Log;
-use crate::diagnose::slopes::{CHANNELS, Slopes};
+use crate::diagnose::slopes::Slopes;
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::Quantity;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::blocks::FieldRow;
 use hallstage_solver::solve::field::parameters::FieldParameters;
@@ -10,17 +12,6 @@ use nalgebra::Vector3;
 use runtime::VerticalPose;
 use runtime::capacitive::gaps_m;
 use std::ops::Range;
-
-/// What is wrong with the channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// Its zero, by 1 um.
-    Offset,
-    /// Its gain, by 1 %.
-    Gain,
-    /// Its time: it is 1 ms later than the others.
-    Lag,
-}
 
 /// How a fault goes over the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,33 +34,32 @@ impl Course {
     }
 }
 
-/// A row of the bank: what, the first of the [`CHANNELS`] at fault, and the one after the last.
+/// A row of the bank: what, the first of [`Channel::SINGLE`] at fault, and the one after the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Family(pub(super) Kind, usize, usize);
+pub(super) struct Family(pub(super) Quantity, usize, usize);
 
 /// All faults that are looked for: each alone, and the gains and times of all channels of a kind together; the
 /// beams have one laser. What they are all late by is an unknown of the fit, and so that of all Hall probes.
 pub(super) fn families() -> impl Iterator<Item = Family> {
     let each = |kind, channels: Range<usize>| channels.map(move |k| Family(kind, k, k + 1));
     let all = |kind, first: &'static [usize]| first.iter().map(move |&k| Family(kind, k, k + 3));
-    let gains = each(Kind::Gain, 0..3).chain(each(Kind::Gain, 6..9));
-    let others = each(Kind::Offset, 0..9).chain(each(Kind::Lag, 0..9));
-    let groups = all(Kind::Gain, &[0, 3, 6]).chain(all(Kind::Lag, &[3, 6]));
+    let gains = each(Quantity::Gain, 0..3).chain(each(Quantity::Gain, 6..9));
+    let others = each(Quantity::Zero, 0..9).chain(each(Quantity::Time, 0..9));
+    let groups = all(Quantity::Gain, &[0, 3, 6]).chain(all(Quantity::Time, &[3, 6]));
     gains.chain(groups).chain(others)
 }
 
 impl Family {
     /// Of the time of a beam: X, Y1, Y2.
     pub(super) fn late(beam: usize) -> Self {
-        Self(Kind::Lag, 3 + beam, 4 + beam)
+        Self(Quantity::Time, 3 + beam, 4 + beam)
     }
 
     /// The channel or the group.
-    pub(super) fn channel(&self) -> &'static str {
-        let name = CHANNELS[self.1];
+    pub(super) fn channel(&self) -> Channel {
         match self.is_single() {
-            true => name,
-            false => name.split('_').next().unwrap_or(name),
+            true => Channel::SINGLE[self.1],
+            false => Channel::GROUPS[self.1 / 3],
         }
     }
 
@@ -83,12 +73,12 @@ impl Family {
 
     /// Whether a reset takes it off.
     pub(super) fn ends_with_movement(&self) -> bool {
-        self.0 == Kind::Offset && self.1 < 6
+        self.0 == Quantity::Zero && self.1 < 6
     }
 
     /// Whether it may come and stay.
     pub(super) fn stays(&self) -> bool {
-        self.0 == Kind::Gain || self.0 == Kind::Offset && !self.is_of_beams()
+        self.0 == Quantity::Gain || self.0 == Quantity::Zero && !self.is_of_beams()
     }
 }
 
@@ -146,10 +136,10 @@ impl<'a> Bank<'a> {
             let before = at.saturating_sub(1).max(movement.start);
             let after = (at + 1).min(movement.end - 1);
             let size = |channel: usize| match family.0 {
-                Kind::Offset => 1e-3,
-                Kind::Gain => 1e-2 * self.values[at][channel],
-                Kind::Lag if before == after => 0.0,
-                Kind::Lag => {
+                Quantity::Zero => 1e-3,
+                Quantity::Gain => 1e-2 * self.values[at][channel],
+                Quantity::Time if before == after => 0.0,
+                Quantity::Time => {
                     let [from, to] = [before, after].map(|at| self.values[at][channel]);
                     -1e-3 * (to - from) / (time_s(after) - time_s(before))
                 }

@@ -20,15 +20,17 @@ mod service_tests;
 mod tests;
 
 use crate::fit::{Repair, with_beams_later};
-use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted};
-use columns::{Bank, Course, Family, Kind};
+use crate::judge::predicted::{Predicted, declared_service};
+use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, severity};
+use columns::{Bank, Course, Family};
 use estimate::Estimate;
-use findings::{not_determined, without_course};
+use findings::{changes_often, not_determined};
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Finding, Severity};
+use hallstage_input::finding::{Finding, Quantity, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::carry::{Service, service_poses};
+use hallstage_solver::solve::field::carry::Service;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::probe::probes;
 use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE};
@@ -44,8 +46,6 @@ const FAULTS_MAX: usize = 6;
 /// Of one channel at most so many are taken off: it may change and come back. Steps and ramps can follow another
 /// course, too, but are not that.
 const COURSES_MAX: usize = 2;
-/// Errors in service over the noise floor below which a finding is a note.
-const NOTE_MAX: f64 = 1.05;
 /// One sound log in so many has a fault that a fit can feel.
 pub(super) const RARITY: f64 = 100.0;
 /// A lag beyond this part of a servo period is taken off before anything else is looked at.
@@ -75,38 +75,19 @@ pub struct Diagnosis {
     pub rest: f64,
 }
 
-/// The severity of a cost.
-pub fn severity(ratio: f64) -> Severity {
-    match ratio {
-        ratio if ratio < NOTE_MAX => Severity::Note,
-        ratio if ratio < LIMITED_MAX => Severity::Warn,
-        _ => Severity::Refuse,
-    }
-}
-
 /// What a log is judged by.
 #[derive(Clone, Copy, Debug)]
 pub struct Fitted<'a> {
     /// The parameters, of other models as one of the field model.
     pub parameters: &'a FieldParameters,
+    /// The parameters that describe the log best, from which the estimate starts.
+    pub start: &'a FieldParameters,
     /// The model.
     pub model: ModelKind,
     /// Whether the model describes service and the log can carry it without what is declared of resets.
     pub for_service: bool,
     /// Whether they are fitted to the rows that are judged.
     pub is_to_rows: bool,
-}
-
-/// The service that `[motion]` declares, of a stage with this white noise of its probes, mm.
-pub fn declared_service(
-    stage: &Stage,
-    parameters: &FieldParameters,
-    white_mm: [f64; 3],
-) -> Option<Service> {
-    // Sines that start anywhere have half of their range as rms, poses spread evenly a part of 1 / sqrt(3).
-    let most = |axis: usize| 0.75f64.sqrt() * stage.motion.axes[axis].service;
-    let poses = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
-    Service::new(parameters, white_mm, poses)
 }
 
 /// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
@@ -122,10 +103,10 @@ pub fn diagnose(
         stage,
         fitted,
         is_bent,
-        log: Log::new(dataset, stage, &probes(fitted.parameters)),
+        log: Log::new(dataset, stage, &probes(fitted.start)),
         lags_s: [0.0; 3],
     };
-    let mut start = *fitted.parameters;
+    let mut start = *fitted.start;
     let mut rounds = 0..ROUNDS;
     let first = loop {
         let bank = Bank::new(&job.log, stage, &start, 0.0);
@@ -198,8 +179,12 @@ impl Job<'_> {
             };
             let near = best.gain - f64::max(UNDECIDED, NOTHING * best.gain);
             let channels = found.iter().filter(|other| other.gain > near);
-            let mut alike: Vec<&str> = channels.map(|other| other.family.channel()).collect();
-            alike.retain(|channel| *channel != best.family.channel());
+            let channels = channels.map(|other| other.family.channel());
+            let mut alike: Vec<Channel> = channels
+                .filter(|channel| *channel != best.family.channel())
+                .collect();
+            // Of one channel several courses may explain the log.
+            alike.sort_unstable();
             alike.dedup();
             faults.push(Fault {
                 alike,
@@ -276,12 +261,12 @@ impl Job<'_> {
         } else if let Some(Split { from, off, .. }) = other {
             let whole = faultless.curvature.inverse();
             let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
-            without_repair(self.two_states(from, predicted.worst_ratio()), predicted)
+            without_repair(self.other_state(from, predicted.worst_ratio()), predicted)
         } else {
             self.of_faults(&faults, estimate, &declared, rest)?
         };
         if is_open && !decides {
-            let open = not_determined(&own).severe(Severity::Warn);
+            let open = not_determined(&own).with_severity(Severity::Warn);
             out.findings.insert(0, open);
         }
         Some(out)
@@ -310,7 +295,7 @@ impl Job<'_> {
             if is_felt(cost) {
                 is_worth_it = true;
                 // An error of the reference or one that may be another's says nothing of the stage.
-                let of_laser = fault.family.0 == Kind::Gain && fault.family.is_of_beams();
+                let of_laser = fault.family.0 == Quantity::Gain && fault.family.is_of_beams();
                 is_clear &= fault.alike.is_empty() && !of_laser;
                 channels.push(fault.family.channel());
             }
@@ -326,10 +311,10 @@ impl Job<'_> {
                 findings.push(self.finding(fault, *size, cost.min(of_fit)));
             }
         }
-        let of = |channel: &str| channels.iter().filter(|other| **other == channel).count();
-        if let Some(channel) = channels.iter().find(|channel| of(channel) > COURSES_MAX) {
+        let of = |channel: Channel| channels.iter().filter(|other| **other == channel).count();
+        if let Some(&channel) = channels.iter().find(|channel| of(**channel) > COURSES_MAX) {
             is_clear = false;
-            findings.push(without_course(channel, of_fit));
+            findings.push(changes_often(channel, of_fit));
         }
         if let Some((fault, late_ms)) = self.late_beam(lags_s) {
             // What bent the fit, whatever else did.
@@ -345,7 +330,6 @@ impl Job<'_> {
         let repair = Repair {
             parameters: estimate.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
-            faults: Vec::new(),
         };
         Some(Diagnosis {
             findings,

@@ -1,8 +1,10 @@
 //! Which fault would explain the residuals best, the parameters profiled out.
 
-use super::columns::{Bank, Course, Family, Kind, families};
+use super::columns::{Bank, Course, Family, families};
 use super::estimate::{Estimate, RESIDUAL, WIDTH};
 use super::{NOTHING, UNDECIDED};
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::Quantity;
 use hallstage_solver::solve::field::whiten::UNKNOWNS;
 use hallstage_solver::solve::gauss_newton::{Factor, Normal};
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
@@ -17,7 +19,7 @@ pub(super) struct Fault {
     /// By how much it makes chi-square smaller.
     pub(super) gain: f64,
     /// Other channels or groups that explain it as well.
-    pub(super) alike: Vec<&'static str>,
+    pub(super) alike: Vec<Channel>,
 }
 
 type Columns = SMatrix<f64, WIDTH, 3>;
@@ -76,11 +78,11 @@ impl<'a> Scan<'a> {
             found.first().map(|(_, gain)| (course, *gain))
         };
         let mut found = Vec::new();
-        if family.0 == Kind::Lag {
+        if family.0 == Quantity::Time {
             found.push(whole(Course::On(0, all.end)));
         }
         // Channels of a kind have one clock.
-        if family.0 != Kind::Lag || !family.is_single() {
+        if family.0 != Quantity::Time || !family.is_single() {
             found.push(whole(Course::Ramp));
         }
         if family.stays() {

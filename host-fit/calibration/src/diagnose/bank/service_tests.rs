@@ -1,7 +1,7 @@
 //! What is predicted of service, against service.
 
 use super::tests::stage;
-use crate::diagnose::{Diagnosis, of_log};
+use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};
 use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
@@ -38,7 +38,7 @@ fn in_service(
 ) -> (Fit, Diagnosis, [f64; 3]) {
     let dataset = of_protocol(stage, seed, protocol);
     let fitted = fit(&dataset, stage, &FitSettings::new(choice)).expect("a fit");
-    let diagnosis = of_log(&dataset, stage, Ok(&fitted));
+    let diagnosis = diagnose_log(&dataset, stage, Ok(&fitted));
     let service = of_protocol(stage, seed, Protocol::Service);
     let judgement = Decoded::new(&fitted.set, &service).judge(&service, stage, Zeros::None);
     let rms = judgement.errors.axes.map(|axis| axis.rms);

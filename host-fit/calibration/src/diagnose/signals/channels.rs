@@ -1,7 +1,7 @@
 //! The signals of one log, channel by channel.
 
 use hallstage_input::dataset::{Dataset, LogSource, Row};
-use hallstage_input::finding::{Code, Finding};
+use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics;
 use std::ops::Range;
@@ -14,7 +14,7 @@ pub(super) struct LogSignals<'a> {
     pub(super) rows: &'a [Row],
     /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
-    /// By channel and row, m: those of [`CHANNELS`](crate::diagnose::slopes::CHANNELS), gaps where the log
+    /// By channel and row, m: those of [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE), gaps where the log
     /// has codes.
     pub(super) channels: Vec<Vec<f64>>,
     /// Whether a row is used by the tests that follow.
@@ -56,10 +56,10 @@ impl<'a> LogSignals<'a> {
     }
 
     /// A finding at a row.
-    pub(super) fn found_at(&self, row: usize, code: Code, message: String) -> Finding {
+    pub(super) fn found_at(&self, row: usize, kind: Kind) -> Finding {
         let Row { movement, t_us, .. } = self.rows[row];
         let movement = &self.dataset.movements[movement];
-        Finding::new(code, message).at(self.dataset.movement_name(movement), t_us)
+        Finding::new(kind).with_place(self.dataset.movement_name(movement), t_us)
     }
 }
 

@@ -4,9 +4,9 @@ use super::CLEAR;
 use super::channels::LogSignals;
 use super::residual::{Residuals, is_seen};
 use crate::diagnose::of_fit::severity;
-use crate::diagnose::slopes::CHANNELS;
 use crate::judge::spectrum::{Spectrum, windows};
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Finding, Kind, Severity};
 use std::ops::Range;
 
 /// Longest window, s: its bins tell 50 Hz from 60.
@@ -48,17 +48,14 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let finding = |channel: usize| {
         let own = lines.iter().filter(|line| line.0 == channel);
         let &(_, noises, bin) = own.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let name = CHANNELS[channel];
-        let frequency_hz = bin as f64 / (length as f64 * log.period_s);
-        let message = format!(
-            "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
-             its cable and supply, or for a vibration of that part",
-            raw[channel].amplitude(bin) * 1e6,
-        );
+        let kind = Kind::Hum {
+            frequency_hz: bin as f64 / (length as f64 * log.period_s),
+            amplitude_m: raw[channel].amplitude(bin),
+        };
         // How much more noise it makes.
         let share = (1.0 + 0.5 * noises * noises).sqrt() - 1.0;
-        let found = Finding::new(Code::Hum, message).severe(severity(share).min(Severity::Warn));
-        Some(found.on(name).of(frequency_hz, "Hz"))
+        let found = Finding::new(kind).with_severity(severity(share).min(Severity::Warn));
+        Some(found.with_channel(Channel::SINGLE[channel]))
     };
     (0..raw.len()).filter_map(finding).collect()
 }
@@ -66,15 +63,18 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{PERIOD_S, codes, only, recording};
+    use hallstage_input::channel::Channel;
     use hallstage_input::finding::Code;
     use std::f64::consts::TAU;
 
     #[test]
     fn hum_is_named_once_with_its_frequency_and_channel() {
         let sound = recording();
-        for (channel, name, frequency_hz) in
-            [(2, "hall_c", 50.0), (3, "ifm_x", 61.3), (4, "ifm_y1", 50.0)]
-        {
+        for (channel, name, frequency_hz) in [
+            (2, Channel::HallC, 50.0),
+            (3, Channel::BeamX, 61.3),
+            (4, Channel::BeamY1, 50.0),
+        ] {
             let mut recording = sound.clone();
             for samples in &mut recording.movements {
                 for (k, sample) in samples.iter_mut().enumerate() {
@@ -86,7 +86,7 @@ mod tests {
                 }
             }
             let found = only(&recording, Code::Hum, Some(name));
-            let off_hz = found.value.expect("a frequency") - frequency_hz;
+            let off_hz = found.value().expect("a frequency") - frequency_hz;
             assert!(off_hz.abs() < 0.26, "{off_hz} Hz");
         }
     }

@@ -68,15 +68,8 @@ fn of_log(log: &mut LogSignals, (parameters, lag_s): (&FieldParameters, f64)) ->
     }
     let (rows, all, count) = (log.rows.len(), source.rows_read, log.dataset.logs.len());
     for found in &mut found {
-        if count > 1 {
-            found.message = format!("{}: {}", source.name(), found.message);
-        }
-        if let (Some(movement), Some(t_us)) = (&found.movement, found.t_us) {
-            found.message += &format!(". See movement {movement} at t_us = {t_us}");
-        }
-        if rows < all {
-            found.message += &format!(" (looked for in {rows} of {all} rows)");
-        }
+        found.log = (count > 1).then(|| source.name());
+        found.sample = (rows < all).then_some([rows, all]);
     }
     found
 }

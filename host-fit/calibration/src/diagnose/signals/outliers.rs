@@ -3,8 +3,8 @@
 use super::channels::{LogSignals, median};
 use super::residual::{Residuals, is_seen};
 use super::{BLOCK, CLEAR};
-use crate::diagnose::slopes::CHANNELS;
-use hallstage_input::finding::{Code, Finding};
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::statistics::robust_deviation;
 use rayon::prelude::*;
 
@@ -38,15 +38,15 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     let found: Vec<(usize, usize, f64)> = far.iter().filter_map(cause).collect();
     let finding = |channel: usize| {
         let own = || found.iter().filter(move |found| found.0 == channel);
-        let (name, first, count) = (CHANNELS[channel], own().next()?.1, own().count());
-        let message = format!(
-            "{count} {} of {name} far outside the noise, by up to {:.1} um. A fit with --loss cauchy, the default, leaves them \
-             out of account; look for lost pulses, sparks and bits",
-            if count == 1 { "row" } else { "rows" },
-            own().map(|found| found.2).fold(0.0, f64::max) * 1e6,
-        );
-        let found = log.found_at(first, Code::Outliers, message);
-        Some(found.on(name).of(count as f64, "rows"))
+        let first = own().next()?.1;
+        let kind = Kind::OutlierRows {
+            rows: own().count(),
+            largest_m: own().map(|found| found.2).fold(0.0, f64::max),
+        };
+        Some(
+            log.found_at(first, kind)
+                .with_channel(Channel::SINGLE[channel]),
+        )
     };
     (0..log.channels.len()).filter_map(finding).collect()
 }
@@ -62,12 +62,17 @@ fn about(log: &LogSignals, row: usize, reach: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use crate::diagnose::signals::sample_for_tests::{codes, only, recording};
+    use hallstage_input::channel::Channel;
     use hallstage_input::finding::Code;
 
     #[test]
     fn jumps_are_counted_and_the_channel_named_that_jumps() {
         let sound = recording();
-        for (channel, name) in [(1, "hall_b"), (3, "ifm_x"), (5, "ifm_y2")] {
+        for (channel, name) in [
+            (1, Channel::HallB),
+            (3, Channel::BeamX),
+            (5, Channel::BeamY2),
+        ] {
             let mut recording = sound.clone();
             for k in 0..10 {
                 let sample = &mut recording.movements[k % 3][100 + 171 * k];
@@ -78,8 +83,8 @@ mod tests {
                 }
             }
             let found = only(&recording, Code::Outliers, Some(name));
-            assert_eq!((found.value, found.t_us), (Some(10.0), Some(200_000)));
-            assert_eq!(found.movement.as_deref(), Some("0"));
+            assert_eq!((found.value(), found.t_us()), (Some(10.0), Some(200_000)));
+            assert_eq!(found.movement(), Some("0"));
         }
     }
 }

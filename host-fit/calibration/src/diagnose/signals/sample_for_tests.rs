@@ -1,8 +1,9 @@
 //! A small simulated log for the tests of faults.
 
 use super::signal_findings;
-use crate::diagnose::parameters_of;
+use crate::diagnose::Described;
 use crate::fit::{FitSettings, ModelChoice, fit};
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Severity};
 use hallstage_input::shipped::STAGE_TOML;
@@ -79,8 +80,8 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
 
 pub(super) fn found(dataset: &Dataset) -> Vec<Finding> {
     let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
-    let (parameters, lag_s) = parameters_of(fitted.as_ref(), &stage());
-    signal_findings(dataset, &stage(), (&parameters, lag_s)).0
+    let by = Described::by_fit(fitted.as_ref(), &stage());
+    signal_findings(dataset, &stage(), (&by.parameters, by.lag_s)).0
 }
 
 /// The warnings about a log.
@@ -91,12 +92,13 @@ pub(super) fn warnings(dataset: &Dataset) -> Vec<Finding> {
 }
 
 /// The only warning about a recording, of this code and channel.
-pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> Finding {
+pub(super) fn only(recording: &Recording, code: Code, channel: Option<Channel>) -> Finding {
     let found = warnings(&dataset(recording));
     let [finding] = &found[..] else {
         panic!("{found:#?}");
     };
-    assert_eq!((finding.code, finding.channel.as_deref()), (code, channel));
+    let channels = finding.channels().first().copied();
+    assert_eq!((finding.code(), channels), (code, channel));
     finding.clone()
 }
 
@@ -105,7 +107,7 @@ pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> 
 #[test]
 fn rests_make_no_other_test_of_residuals_more_certain() {
     let found = found(&dataset(&with_rests(150)));
-    let codes: Vec<Code> = found.iter().map(|finding| finding.code).collect();
+    let codes: Vec<Code> = found.iter().map(|finding| finding.code()).collect();
     assert_eq!(codes, [Code::IdleMovement], "{found:#?}");
 }
 

@@ -65,20 +65,18 @@ fn stuck_in(log: &LogSignals, residuals: &Residuals, window: &Range<usize>) -> O
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{held, only, recording};
+    use hallstage_input::channel::Channel;
     use hallstage_input::finding::Code;
 
     #[test]
     fn a_channel_that_stands_still_but_for_its_noise_is_stuck() {
-        for (channel, name) in [(2, "hall_c"), (3, "ifm_x")] {
+        for (channel, name) in [(2, Channel::HallC), (3, Channel::BeamX)] {
             let found = only(
                 &held(&recording(), channel, 1, 0..1000, 1.0),
                 Code::Stuck,
                 Some(name),
             );
-            assert_eq!(
-                (found.movement.as_deref(), found.t_us),
-                (Some("1"), Some(0))
-            );
+            assert_eq!((found.movement(), found.t_us()), (Some("1"), Some(0)));
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::channels::{LogSignals, levels};
 use super::{BLOCK, CLEAR};
 use crate::diagnose::of_fit::severity;
-use crate::diagnose::slopes::CHANNELS;
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Finding, Kind, Severity};
 use std::ops::Range;
 
 /// What moves by less stands still, m: a few times what the interferometers drift in a movement.
@@ -23,13 +23,12 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     };
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
     let first = idle.first()?.start;
-    let message = format!(
-        "nothing moves in {} of {} movements: they add nothing to the fit; leave them out or record them again",
-        idle.len(),
-        log.segments.len(),
-    );
+    let kind = Kind::IdleMovements {
+        movements: idle.len(),
+        of: log.segments.len(),
+    };
     log.leave_out(idle, 0);
-    Some(log.found_at(first, Code::IdleMovement, message))
+    Some(log.found_at(first, kind))
 }
 
 /// Names channels that repeat a value for longer than noise does.
@@ -92,28 +91,29 @@ pub(super) fn named(
 ) -> Vec<Finding> {
     let finding = |(channel, runs): (usize, &Vec<Range<usize>>)| {
         let longest = runs.iter().max_by_key(|run| run.len())?;
-        let rows = runs.iter().map(Range::len).sum::<usize>() as f64;
-        let share = rows / log.rows.len() as f64;
-        let (name, values) = (CHANNELS[channel], &log.channels[channel]);
+        let rows = runs.iter().map(Range::len).sum::<usize>();
+        let share = rows as f64 / log.rows.len() as f64;
+        let values = &log.channels[channel];
         let value = values[longest.start];
         let is_end = values.iter().all(|&x| x <= value) != values.iter().all(|&x| x >= value);
         let is_flat = channel / 3 != 1 && spread(&values[longest.clone()]) == 0.0;
-        let stood_s = longest.len() as f64 * log.period_s;
-        let (code, size, unit) = match is_flat && is_end {
-            true => (Code::Saturated, rows, "rows"),
-            false => (Code::Stuck, stood_s, "s"),
+        let longest_s = longest.len() as f64 * log.period_s;
+        let kind = match is_flat && is_end {
+            true => Kind::StandsAtEnd {
+                rows,
+                share,
+                longest_s,
+            },
+            false => Kind::Stands {
+                rows,
+                share,
+                longest_s,
+            },
         };
-        let message = format!(
-            "{name} stands still in {rows} rows, {:.1} % of the log, for up to {stood_s:.3} s together: {}",
-            100.0 * share,
-            code.entry().remedy,
-        );
-        let found = log.found_at(longest.start, code, message).on(name);
-        Some(
-            found
-                .severe(severity(share).max(Severity::Warn))
-                .of(size, unit),
-        )
+        let found = log
+            .found_at(longest.start, kind)
+            .with_channel(Channel::SINGLE[channel]);
+        Some(found.with_severity(severity(share).max(Severity::Warn)))
     };
     let findings = runs.iter().enumerate().filter_map(finding).collect();
     log.leave_out(runs.into_iter().flatten(), beside);
@@ -129,17 +129,18 @@ fn spread(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{ROWS, held, only, recording};
+    use hallstage_input::channel::Channel;
     use hallstage_input::finding::{Code, Severity};
 
     #[test]
     fn a_channel_that_repeats_its_code_is_stuck_and_one_that_does_so_in_a_tenth_refused() {
-        for (channel, name) in [(2, "hall_c"), (3, "ifm_x"), (7, "cap_2")] {
+        for (channel, name) in [(2, Channel::HallC), (3, Channel::BeamX), (7, Channel::Gap2)] {
             for (rows, severity) in [(300, Severity::Warn), (600, Severity::Refuse)] {
                 let frozen = held(&recording(), channel, 1, 500..500 + rows, 0.0);
                 let found = only(&frozen, Code::Stuck, Some(name));
                 assert_eq!(found.severity, severity, "{rows} of 6,000 rows");
                 assert_eq!(
-                    (found.movement.as_deref(), found.t_us),
+                    (found.movement(), found.t_us()),
                     (Some("1"), Some(1_000_000))
                 );
             }
@@ -155,7 +156,7 @@ mod tests {
                 ten.iter_mut().for_each(|sample| sample.hall[2] = read);
             }
         }
-        let found = only(&slow, Code::Stuck, Some("hall_c"));
+        let found = only(&slow, Code::Stuck, Some(Channel::HallC));
         assert_eq!(found.severity, Severity::Refuse);
     }
 
@@ -166,7 +167,7 @@ mod tests {
             idle = held(&idle, channel, 2, 0..ROWS, 1.0);
         }
         let found = only(&idle, Code::IdleMovement, None);
-        assert_eq!(found.movement.as_deref(), Some("2"));
+        assert_eq!(found.movement(), Some("2"));
     }
 
     #[test]
@@ -180,9 +181,9 @@ mod tests {
                 clipped += usize::from(sample.hall[1] >= top);
                 sample.hall[1] = sample.hall[1].min(top);
             }
-            let found = only(&recording, Code::Saturated, Some("hall_b"));
+            let found = only(&recording, Code::Saturated, Some(Channel::HallB));
             assert_eq!(found.severity, severity);
-            let rows = found.value.expect("rows");
+            let rows = found.value().expect("rows");
             assert!(
                 rows > 0.8 * f64::from(clipped as u32) && rows <= f64::from(clipped as u32),
                 "{rows} {clipped}"

@@ -2,7 +2,7 @@
 
 use super::channels::LogSignals;
 use crate::diagnose::of_fit::severity;
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Finding, Kind, Severity};
 
 /// What the times of rows show against their sequence. Shares of the rows, and of the period: at 1 mm/s and
 /// 2 ms a part of 2 % is 40 nm of motion.
@@ -26,39 +26,29 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
     if let Some((first, ..)) = gaps.first() {
         let missing: f64 = gaps.iter().map(|(_, k, _)| k - 1.0).sum();
         let share = missing / (missing + log.rows.len() as f64);
-        let message = format!(
-            "{missing} rows are missing ({:.2} %) in {} gaps: look for frames that the recorder lost",
-            share * 100.0,
-            gaps.len(),
-        );
-        let lost = log.found_at(*first, Code::RowsMissing, message);
-        found.push(
-            lost.severe(severity(share).min(Severity::Warn))
-                .of(missing, "rows"),
-        );
+        let kind = Kind::RowsMissing {
+            rows: missing,
+            share,
+            gaps: gaps.len(),
+        };
+        let lost = log.found_at(*first, kind);
+        found.push(lost.with_severity(severity(share).min(Severity::Warn)));
     }
     if severity(rms_us / period_us) > Severity::Note {
-        let message = format!(
-            "rows come at uneven times, {rms_us:.0} us rms off an even rate: have the servo's clock start all converters and \
-             stamp the rows"
-        );
-        found.push(Finding::new(Code::Jitter, message).of(rms_us, "us"));
+        found.push(Finding::new(Kind::UnevenTimes { rms_us }));
     }
     let servo_us = log.stage.servo_period_s * 1e6;
     let servo_periods = period_us / servo_us;
     if severity((servo_periods - 1.0).abs()) > Severity::Note {
-        let count = servo_periods.round().max(1.0);
-        let severity = severity((servo_periods / count - 1.0).abs()).min(Severity::Warn);
-        let what = match severity {
-            Severity::Note => format!("the log is thinned, to one of {count} servo periods: "),
-            _ => String::new(),
+        let whole = servo_periods.round().max(1.0);
+        let severity = severity((servo_periods / whole - 1.0).abs()).min(Severity::Warn);
+        let periods = (severity == Severity::Note).then_some(whole);
+        let kind = Kind::OtherRate {
+            period_us,
+            servo_us,
+            periods,
         };
-        let message = format!(
-            "{what}rows are {period_us:.1} us apart, the servo period of stage.toml is {servo_us:.1} us: log every period, or \
-             correct servo.period_s"
-        );
-        let rate = Finding::new(Code::Jitter, message).severe(severity);
-        found.push(rate.of(period_us, "us"));
+        found.push(Finding::new(kind).with_severity(severity));
     }
     found
 }
@@ -68,13 +58,14 @@ mod tests {
     use super::super::sample_for_tests::{PERIOD_S, dataset, found, recording};
     use super::*;
     use hallstage_input::dataset::Dataset;
+    use hallstage_input::finding::Code;
     use hallstage_simulate::random::{Purpose, Stream};
 
     fn only(dataset: &Dataset) -> (Code, Severity, f64) {
         let found = found(dataset);
         assert_eq!(found.len(), 1, "{found:#?}");
-        let value = found[0].value.expect("a size");
-        (found[0].code, found[0].severity, value)
+        let value = found[0].value().expect("a size");
+        (found[0].code(), found[0].severity, value)
     }
 
     /// One row of so many is missing.

@@ -246,7 +246,7 @@ fn voltages_become_the_codes_of_the_converter() {
     let other = with_volts("3.2e-4", "").expect("sound");
     let reading = read_in(in_volts.as_bytes(), &other).expect("read, with a warning");
     assert!(
-        matches!(reading.warnings.as_slice(), [found] if found.code == Code::BetweenCodes && found.value > Some(0.15)),
+        matches!(reading.warnings.as_slice(), [found] if found.code() == Code::BetweenCodes && found.value() > Some(0.15)),
         "{:?}",
         reading.warnings
     );

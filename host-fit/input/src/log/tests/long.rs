@@ -89,9 +89,9 @@ fn rows_that_are_left_out_of_many_movements_are_reported_in_few_lines() {
     assert_eq!(reading.skipped_rows, 25_000);
     assert_eq!(reading.warnings.len(), 1 + 1);
     let last = reading.warnings.last().expect("warnings");
-    assert_eq!(last.value, Some(25_000.0));
-    assert!(last.message.contains("1, 5, 9, "), "{last:?}");
-    assert!(last.message.contains(" and 15 more"), "{last:?}");
+    let lost = matches!(&last.kind, Kind::MovementsSkipped { movements, rows: 25_000, .. }
+        if movements.len() == 25 && movements[..3] == [1, 5, 9]);
+    assert!(lost, "{last:?}");
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn lengths(text: &str, split_s: Option<f64>) -> Vec<usize> {
     let reading = read_split(text, split_s).expect("sound");
     let movements = reading.dataset.movements;
     let is_found = reading.warnings.iter().any(|found| {
-        found.code == Code::MovementsByTime && found.value == Some(movements.len() as f64)
+        found.code() == Code::MovementsByTime && found.value() == Some(movements.len() as f64)
     });
     assert!(is_found, "{:?}", reading.warnings);
     for (slot, (movement, index)) in movements.iter().zip(0..).enumerate() {
@@ -121,7 +121,7 @@ fn one_file_for_each_movement() {
     let reading = read(&paths, stage(), &ReadOptions::default()).expect("sound");
     let want = [(0, 0, 0..30), (1, 0, 30..61), (2, 0, 61..93)];
     assert_eq!(movements(&reading.dataset), want);
-    let codes: Vec<Code> = reading.warnings.iter().map(|found| found.code).collect();
+    let codes: Vec<Code> = reading.warnings.iter().map(|found| found.code()).collect();
     assert_eq!(codes, [Code::MovementsByTime; 3]);
     let name = reading.dataset.movement_name(&reading.dataset.movements[1]);
     assert!(name.contains("run1.csv"));

@@ -1,0 +1,88 @@
+//! The mistakes that explain a log, and what sets it right.
+
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Cause, Code, Correction};
+
+/// The evidence and the remedy of a mistake.
+pub(super) fn mistake(
+    code: Code,
+    causes: &[Cause],
+    is_sure: bool,
+    may_be_magnets: bool,
+) -> (String, String) {
+    let corrections: Vec<String> = causes.iter().map(cause).collect();
+    let mut evidence = match is_sure {
+        true => "the log does not match stage.toml. It fits if ",
+        false => "the log is consistent but does not match stage.toml. It would fit if ",
+    }
+    .to_owned();
+    evidence += &corrections.join(", or if ");
+    if may_be_magnets {
+        evidence +=
+            ", or if the field of the magnets falls as much faster with height than designed";
+    }
+    let mut remedy = code.entry().remedy.to_owned();
+    if causes.len() > 1 || may_be_magnets {
+        evidence += ". The log does not show which";
+        remedy = "find out which before you change anything: check wiring, columns, units and stage.toml".to_owned();
+    }
+    if causes.iter().any(|cause| cause.values.is_some()) {
+        remedy += ". The values are rough: find the exact ones";
+    }
+    (evidence, remedy)
+}
+
+fn cause(cause: &Cause) -> String {
+    let what = correction(&cause.correction);
+    let Some(values) = cause.values else {
+        return what;
+    };
+    // A factor has two digits.
+    let is_factor = cause.correction.unit().is_empty();
+    let shown = |value: f64| {
+        let digits = match is_factor {
+            true => 1 - value.log10().floor() as i32,
+            false => 0,
+        };
+        let place = 10f64.powi(-digits);
+        let rounded = (value / place).round() * place;
+        format!("{rounded:.*}", digits.max(0) as usize)
+    };
+    let unit = if is_factor { "" } else { " degrees" };
+    let [best, low, high] = values.map(shown);
+    match low == high {
+        true => format!("{what} about {best}{unit}"),
+        false => format!("{what} about {best}{unit} ({low} to {high})"),
+    }
+}
+
+fn correction(correction: &Correction) -> String {
+    match correction {
+        Correction::Exchange(pair) => format!("{} are exchanged", titles(pair)),
+        Correction::Order(all, order) => format!("{} are read as {}", all.title(), titles(order)),
+        Correction::Scale(some) => format!("the scale of {} is multiplied by", titles(some)),
+        Correction::Sign(some) => format!("the sign of {} is inverted", titles(some)),
+        Correction::BaselineScale => {
+            "Rz of the reference (1 / interferometer.y_baseline_m) is multiplied by".to_owned()
+        }
+        Correction::HallPlaces => "the places of the Hall probes are multiplied by".to_owned(),
+        Correction::GapPlaces => {
+            "the places of the capacitive sensors are multiplied by".to_owned()
+        }
+        Correction::GapPlace(sensor, axis, place_m) => {
+            format!(
+                "the {axis} of {} in stage.toml is {place_m} m",
+                sensor.title()
+            )
+        }
+        Correction::GapsTurned => "the places of the capacitive sensors are turned by".to_owned(),
+        Correction::GapsMirrored => {
+            "the places of the capacitive sensors are mirrored along x and turned by".to_owned()
+        }
+    }
+}
+
+fn titles(channels: &[Channel]) -> String {
+    let titles: Vec<&str> = channels.iter().map(|channel| channel.title()).collect();
+    titles.join(" and ")
+}

@@ -1,0 +1,232 @@
+//! What a finding measured.
+
+use super::{Code, Place};
+use crate::channel::Channel;
+
+/// What changes of a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Its gain, %.
+    Gain,
+    /// Its zero, um.
+    Zero,
+    /// Its time, ms: positive if it is later than the others.
+    Time,
+}
+
+impl Quantity {
+    /// The unit of a change.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Gain => "%",
+            Self::Zero => "um",
+            Self::Time => "ms",
+        }
+    }
+}
+
+/// How a change of a channel goes over the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TimeCourse {
+    /// It is the same in the whole log.
+    Constant,
+    /// It begins at the place of the finding.
+    Onset,
+    /// It begins with this log.
+    Log(String),
+    /// It grows evenly over the logs.
+    OverLog,
+    /// It grows evenly in each movement; the size is what a second adds.
+    OverMovement,
+}
+
+/// What sets a log right that does not fit to its stage.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Correction {
+    /// Two channels are exchanged.
+    Exchange([Channel; 2]),
+    /// All channels of a kind are read in this order.
+    Order(Channel, [Channel; 3]),
+    /// The scale of these channels is multiplied by the value.
+    Scale(Vec<Channel>),
+    /// The sign of these channels is turned.
+    Sign(Vec<Channel>),
+    /// Rz of the reference, 1 / `interferometer.y_baseline_m`, is multiplied by the value.
+    BaselineScale,
+    /// The distances of the Hall probes from the middle are multiplied by the value.
+    HallPlaces,
+    /// The distances of the capacitive sensors from the middle are multiplied by the value.
+    GapPlaces,
+    /// A coordinate of a capacitive sensor in `stage.toml`, "x" or "y", is so many metres.
+    GapPlace(Channel, &'static str, f64),
+    /// The places of the capacitive sensors are turned by the value, degrees.
+    GapsTurned,
+    /// The same, after they are mirrored along x.
+    GapsMirrored,
+}
+
+impl Correction {
+    /// The channels that are wrong.
+    pub fn channels(&self) -> Vec<Channel> {
+        match self {
+            Self::Exchange(pair) => pair.to_vec(),
+            Self::Order(all, _) => vec![*all],
+            Self::Scale(some) | Self::Sign(some) => some.clone(),
+            Self::BaselineScale => vec![Channel::Rz],
+            Self::HallPlaces => vec![Channel::Halls],
+            Self::GapPlace(sensor, ..) => vec![*sensor],
+            Self::GapPlaces | Self::GapsTurned | Self::GapsMirrored => vec![Channel::Gaps],
+        }
+    }
+
+    /// The unit of the value; empty for a factor.
+    pub const fn unit(&self) -> &'static str {
+        match self {
+            Self::GapsTurned | Self::GapsMirrored => "degrees",
+            _ => "",
+        }
+    }
+}
+
+/// A correction with its value, where it has one: the best, the least and the largest that explain the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cause {
+    /// What sets the log right.
+    pub correction: Correction,
+    /// A factor or an angle, degrees.
+    pub values: Option<[f64; 3]>,
+}
+
+/// One row for each kind: its fields, its code and, where it has one, its size with the unit that JSON names.
+macro_rules! kinds {
+    ($($(#[doc = $doc:literal])* $kind:ident { $($field:ident: $type:ty),* } => $code:expr $(, $value:expr, $unit:expr)?;)*) => {
+        /// What was measured. SI units, but for what a name says: `_um`, `_us`, `_k`, `_c`, `_hz`; `share` is in
+        /// parts of the rows. The channel and the place stand in the finding.
+        #[derive(Clone, Debug, PartialEq)]
+        #[expect(missing_docs, reason = "the names of the fields say what they are")]
+        pub enum Kind { $($(#[doc = $doc])* $kind { $($field: $type),* },)* }
+
+        impl Kind {
+            /// Its code.
+            #[expect(unused_variables, reason = "most codes follow from the kind alone")]
+            pub const fn code(&self) -> Code {
+                match self { $(Self::$kind { $($field),* } => $code,)* }
+            }
+
+            /// How large it is, with the unit.
+            #[expect(unused_variables, reason = "one of the fields is the size")]
+            pub fn size(&self) -> Option<(f64, &'static str)> {
+                match self { $(Self::$kind { $($field),* } => None$(.or(Some(($value, $unit))))?,)* }
+            }
+        }
+    };
+}
+
+kinds! {
+    // Of a file.
+    /// Movements of one row; the number of the first.
+    SingleRows { file: String, first: i64, movements: usize } => Code::ShortMovements, *movements as f64, "movements";
+    /// The last line has no line break.
+    FileCut { file: String, line: usize } => Code::FileCut;
+    /// Movements are separated by the time, every `split_s` seconds and after a gap of more than `gap_rows`.
+    MovementsByTime { file: String, movements: usize, split_s: Option<f64>, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
+    /// Voltages are so many codes from whole ones on average.
+    BetweenCodes { file: String, mean_codes: f64 } => Code::BetweenCodes, *mean_codes, "codes";
+    /// A fit uses `taken` rows in `runs` of rows that follow each other.
+    Excerpt { rows: usize, taken: usize, runs: usize } => Code::Excerpt, *taken as f64, "rows";
+    /// Rows with the same fault, and the cell of the first.
+    RowsSkipped { file: String, reason: &'static str, rows: usize, line: usize, column: usize, name: String } => Code::RowsSkipped, *rows as f64, "rows";
+    /// Movements of which all rows are skipped.
+    MovementsSkipped { file: String, movements: Vec<i64>, rows: usize } => Code::RowsSkipped, *rows as f64, "rows";
+
+    // Of the times and the signals of a log.
+    /// Servo periods without a row.
+    RowsMissing { rows: f64, share: f64, gaps: usize } => Code::RowsMissing, *rows, "rows";
+    /// Times are so far off an even rate.
+    UnevenTimes { rms_us: f64 } => Code::Jitter, *rms_us, "us";
+    /// Rows are farther apart than servo periods; `periods` if that is a whole number.
+    OtherRate { period_us: f64, servo_us: f64, periods: Option<f64> } => Code::Jitter, *period_us, "us";
+    /// Movements in which nothing moves.
+    IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
+    /// A channel repeats a value, or shows its noise alone, while it should move.
+    Stands { rows: usize, share: f64, longest_s: f64 } => Code::Stuck, *longest_s, "s";
+    /// The same at an end of what the channel reads.
+    StandsAtEnd { rows: usize, share: f64, longest_s: f64 } => Code::Saturated, *rows as f64, "rows";
+    /// Rows of a channel far from those before and behind.
+    OutlierRows { rows: usize, largest_m: f64 } => Code::Outliers, *rows as f64, "rows";
+    /// A line in the spectrum of a channel.
+    Hum { frequency_hz: f64, amplitude_m: f64 } => Code::Hum, *frequency_hz, "Hz";
+
+    // Of the residuals.
+    /// A change of a channel, in the unit of the quantity.
+    Change { quantity: Quantity, course: TimeCourse, size: f64 } => code_of_change(*quantity, course), *size, quantity.unit();
+    /// From here on other parameters describe the log.
+    OtherState { log: Option<String> } => Code::LogsDisagree;
+    /// A channel changes more often than can be repaired.
+    ChangesOften {} => Code::ModelLacks;
+    /// The Hall residuals over their noise, where no fault explains them.
+    Inconsistent { ratio: f64 } => Code::ModelLacks, *ratio, "times";
+    /// Predicted errors of X, Y, Rz in service over the noise floor, from what the log does not determine.
+    NotDetermined { ratios: [f64; 3] } => Code::NotDetermined;
+    /// The worst of these ratios, from all faults of the log together.
+    FaultsTogether { ratio: f64 } => Code::NotDetermined;
+    /// A mistake with channels, scales or places; several causes where the log cannot tell them apart.
+    Mistake { code: Code, causes: Vec<Cause>, is_sure: bool, may_be_magnets: bool } => *code, size_of_mistake(causes)?.0, size_of_mistake(causes)?.1;
+    /// The probes are so far from the drawing, in tolerances, and no single mistake explains it.
+    OtherProbes { tolerances: f64 } => Code::TermsAtLimit;
+
+    // Of a fit.
+    /// Rows that count less than half; `end` is the last of them.
+    LeftOut { rows: usize, of: usize, end: Place } => Code::LeftOut, *rows as f64, "rows";
+    /// Rows of a movement on the mean, and the part of the errors that its zero deviation hides.
+    ShortMovements { mean_rows: f64, hidden: f64 } => Code::ShortMovements, *mean_rows, "rows";
+    /// The model is not the field model. Ranges of the errors in service of X, Y, Rz; errors over their noise
+    /// where nothing explains them.
+    OtherModel { reason: String, in_service: Option<[[f64; 2]; 3]>, over_noise: Option<f64> } => Code::ModelLacks;
+    /// The model does not describe the motion; rms of the errors and of the motion along an axis.
+    NotDescribed { model: &'static str, error: f64, motion: f64 } => Code::ModelLacks;
+    /// Zero deviations beyond their range.
+    ZerosClipped { movements: usize, of: usize, largest_m: f64 } => Code::ZeroClipped, *movements as f64, "movements";
+    /// Rows that the decoder refuses.
+    CodesRefused { rows: usize } => Code::Saturated, *rows as f64, "rows";
+    /// The reference is later than the probes, in servo periods, too.
+    LateReference { lag_s: f64, periods: f64 } => Code::ReferenceLag, *lag_s * 1e6, "us";
+    /// A parameter stands at an end of its search range: its value as reports show it, and in SI.
+    AtLimit { parameter: String, shown: (f64, &'static str), value: f64, unit: &'static str } => Code::TermsAtLimit, *value, *unit;
+    /// So many of the vertical terms do.
+    VerticalAtLimit { parameters: usize } => Code::TermsAtLimit, *parameters as f64, "";
+    /// Movements of which a draw has no row.
+    MovementsMissed { movements: Vec<String> } => Code::RowsMissing, movements.len() as f64, "movements";
+    /// The largest error, too large for noise.
+    WildRow { micro: f64, unit: &'static str, ratio: f64 } => Code::Outliers, *micro, *unit;
+
+    // Of the range and the temperature.
+    /// An axis moves otherwise than `[motion]` declares, to either side.
+    OtherMotion { micro: f64, service_micro: f64, unit: &'static str, is_scale: bool } => Code::OutOfRange, *micro, *unit;
+    /// Rows beyond the range in which a blob was calibrated.
+    BeyondRange { rows: usize, of: usize } => Code::OutOfRange, *rows as f64, "rows";
+    /// k or h of Hall A, B, C with their standard errors, %/K, and where they are from.
+    Coefficients { sensor: usize, percent_per_k: [[f64; 2]; 3], zero_c: f64, span_k: f64, is_field: bool, deviations: Option<f64> } => Code::Temperature, *span_k, "K";
+    /// Rows without a temperature, or with one that is farther than `reach_k` from the calibration.
+    NoTemperature { rows: usize, of: usize, reach_k: u32 } => Code::Temperature, *rows as f64, "rows";
+    /// The temperature changes by more than a zero holds.
+    TemperatureChange { sensor: usize, change_k: f64, is_in_movement: bool, rezero_k: f64 } => Code::Temperature, *change_k, "K";
+}
+
+const fn code_of_change(quantity: Quantity, course: &TimeCourse) -> Code {
+    match (quantity, course) {
+        (_, TimeCourse::Log(_)) => Code::LogsDisagree,
+        (Quantity::Gain, _) => Code::GainDrift,
+        (Quantity::Time, _) => Code::ReferenceLag,
+        (Quantity::Zero, TimeCourse::Onset | TimeCourse::Constant) => Code::Step,
+        (Quantity::Zero, _) => Code::Drift,
+    }
+}
+
+/// The value of the only cause.
+fn size_of_mistake(causes: &[Cause]) -> Option<(f64, &'static str)> {
+    match causes {
+        [cause] => Some((cause.values?[0], cause.correction.unit())),
+        _ => None,
+    }
+}
