@@ -34,6 +34,7 @@ use crate::finding::{Finding, Kind};
 use crate::sample::Sampler;
 use crate::stage::Stage;
 use crate::text::TextReader;
+use crate::watch::Watch;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -73,7 +74,7 @@ pub enum ReferenceUse {
 pub const ROWS_HELD_MAX: usize = 10_000_000;
 
 /// How to read logs. The default refuses what is wrong, needs the reference and holds all rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
     /// What to do with bad rows.
     pub bad_rows: BadRows,
@@ -87,6 +88,8 @@ pub struct ReadOptions {
     /// Most rows that are held: of more the dataset is a sample. All are held if `None`, up to
     /// [`ROWS_HELD_MAX`].
     pub rows_max: Option<usize>,
+    /// Shows how far the reading is, and can end it.
+    pub watch: Watch<'static>,
 }
 
 impl ReadOptions {
@@ -97,6 +100,7 @@ impl ReadOptions {
         reference: ReferenceUse::Required,
         split_s: None,
         rows_max: Some(FIT_ROWS_MAX),
+        watch: Watch::NONE,
     };
 
     /// For `decode`: saturated rows are kept, a reference is not needed.
@@ -106,6 +110,7 @@ impl ReadOptions {
         reference: ReferenceUse::IfPresent,
         split_s: None,
         rows_max: None,
+        watch: Watch::NONE,
     };
 }
 

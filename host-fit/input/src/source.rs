@@ -1,6 +1,5 @@
 //! A file as bytes, read whole or piece by piece. `-` is standard input.
 
-use crate::interrupt;
 use std::fs::File;
 use std::io::{Cursor, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -195,10 +194,6 @@ impl Read for Raw<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
         loop {
             match self.file.read(bytes) {
-                // After a read, which may have waited for long.
-                _ if interrupt::requested() => {
-                    return Err(std::io::Error::other(SourceProblem::Interrupted));
-                }
                 Ok(read) => {
                     self.read += read as u64;
                     if let (Some(copy), Some(bytes)) = (&mut self.copy, bytes.get(..read)) {

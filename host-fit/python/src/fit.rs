@@ -5,11 +5,10 @@ use crate::choice::chosen;
 use crate::error::{of_calibrate, refused, wrong};
 use crate::finding;
 use crate::log::Log;
-use crate::work;
+use crate::work::{self, WATCH};
 use host_fit::calibrate::{FitOrder, Limits, check_refusal, loss_of};
 use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
-use host_fit::input::interrupt;
 use host_fit::solver::problem::draw::Draw;
 use host_fit::solver::problem::parameters::Parameters;
 use host_fit::solver::solve::robust::Loss;
@@ -45,7 +44,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     let log = log.get();
     log.check_reference(py)?;
     let mut settings = FitSettings::new(ModelChoice::Auto);
-    settings.options.interrupt = Some(interrupt::flag());
+    settings.options.watch = WATCH;
     let (reading, stage) = (&log.reading, &log.designed);
     let (diagnosis, refusal) = work::run(py, || {
         let fitted = fit_rows(&reading.dataset, stage, &settings);
@@ -122,7 +121,7 @@ pub fn fit(
                 population: population.unwrap_or(usual.population),
                 generations: generations.unwrap_or(usual.generations),
                 known: start.map(|start| Parameters::of_set(start.set())),
-                interrupt: Some(interrupt::flag()),
+                watch: WATCH,
                 ..usual
             },
             serial: blob_text("serial", serial)?,
@@ -144,7 +143,7 @@ pub fn fit(
     })?;
     let (outcome, report) = made.map_err(|error| of_calibrate(&error))?;
     // A search that was interrupted in another thread.
-    if interrupt::requested() {
+    if WATCH.is_stopped() {
         return Err(PyKeyboardInterrupt::new_err(()));
     }
     match report {

@@ -40,6 +40,7 @@ fn options(bad_rows: &str, split_s: Option<f64>) -> PyResult<ReadOptions> {
         split_s,
         // A log that is only decoded has none.
         reference: ReferenceUse::IfPresent,
+        watch: work::WATCH,
         ..ReadOptions::FIT
     })
 }
@@ -361,6 +362,7 @@ impl Log {
         ReadOptions {
             bad_rows: own.bad_rows,
             split_s: own.split_s,
+            watch: own.watch,
             ..command
         }
     }

@@ -3,6 +3,7 @@
 use crate::arrays::{reals, slice, table};
 use crate::error::wrong;
 use host_fit::input::stage::Range;
+use host_fit::input::watch::Watch;
 use host_fit::solver::solve::search::cost::{CostFunction, Individual};
 use host_fit::solver::solve::search::kind::SearchKind;
 use host_fit::solver::solve::search::run::{SearchOptions, StopReason};
@@ -187,7 +188,10 @@ pub fn minimize<'py>(
     let options = SearchOptions {
         first: first.as_slice(),
         evaluations: maxfev.map(|count| count as usize),
-        interrupt: Some(&function.failed),
+        watch: Watch {
+            stop: &function.failed,
+            ..Watch::NONE
+        },
         ..SearchOptions::new(seed, population as usize, maxiter as usize)
     };
     let found = kind.minimize(&function, &options);

@@ -1,8 +1,10 @@
 //! Long work without the GIL: Ctrl-C ends it, and a notebook shows how far it is.
 
-use host_fit::input::{interrupt, progress};
+use host_fit::input::watch::Watch;
 use pyo3::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -10,6 +12,19 @@ use std::time::{Duration, Instant};
 const PERIOD: Duration = Duration::from_millis(50);
 /// What takes less is not shown.
 const SHOWN_AFTER: Duration = Duration::from_secs(1);
+
+/// Set by a signal, until the work has ended.
+static STOP: AtomicBool = AtomicBool::new(false);
+/// The work in hand, how many of its steps are done, and their number.
+static CURRENT: Mutex<Option<(&str, u64, u64)>> = Mutex::new(None);
+
+/// How all work is watched.
+pub const WATCH: Watch<'static> = Watch {
+    stop: &STOP,
+    report: |work, done, steps| {
+        *CURRENT.lock().unwrap_or_else(PoisonError::into_inner) = Some((work, done, steps));
+    },
+};
 
 /// Does `work` in a thread of its own, while this one looks for signals and shows the progress.
 ///
@@ -38,7 +53,7 @@ pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult
                         });
                         raised = looked.err();
                         if raised.is_some() {
-                            interrupt::request();
+                            STOP.store(true, Ordering::Relaxed);
                         }
                     }
                 }
@@ -51,7 +66,7 @@ pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult
         py.import("hallstage._progress")?.call_method0("end")?;
     }
     if let Some(raised) = raised {
-        interrupt::clear();
+        STOP.store(false, Ordering::Relaxed);
         return Err(raised);
     }
     // Without a result the work has panicked, and `scope` with it.
@@ -60,7 +75,8 @@ pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult
 
 /// Shows how far the work is, where somebody sees it.
 fn show(py: Python<'_>) -> PyResult<()> {
-    let Some((what, done, total)) = progress::current() else {
+    let current = *CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some((what, done, total)) = current else {
         return Ok(());
     };
     let module = py.import("hallstage._progress")?;

@@ -25,6 +25,7 @@ use bus_log::BusCounts;
 use hal_adapters::can::Layout;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
+use hallstage_input::watch::Watch;
 use join::{JoinCounts, JoinedRow, join};
 use node_clock::Tick;
 use offset::{Clocks, Offset, Records};
@@ -61,6 +62,8 @@ pub struct ImportSettings {
     pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
     pub skip_bad_lines: bool,
+    /// Shows how far the reading is, and can end it.
+    pub watch: Watch<'static>,
 }
 
 /// How an import went.

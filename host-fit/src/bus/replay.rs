@@ -9,10 +9,9 @@ use crate::output::is_standard;
 use clap::Args;
 use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::{BusFrame, Layout};
-use hallstage_input::interrupt;
 use hallstage_input::log::{LogError, LogRow, LogRows, ReadOptions};
-use hallstage_input::progress::Progress;
 use hallstage_input::stage::{Stage, StageError};
+use hallstage_input::watch::Watch;
 use pace::Pacer;
 use runtime::RawFrame;
 use std::path::{Path, PathBuf};
@@ -112,7 +111,7 @@ const SEND_DEADLINE: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// See [`ReplayError`].
-pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
+pub fn run(settings: &ReplaySettings, watch: Watch<'_>) -> Result<Replayed, ReplayError> {
     let stage = Stage::from_file(&settings.stage)?;
     let layout = choose_layout(settings.layout, &stage)?;
     let most = settings.rows.unwrap_or(usize::MAX);
@@ -127,13 +126,13 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
     let mut player = Player {
         layout,
         bus,
-        stop: interrupt::watch(),
+        stop: watch.stop,
         pacer: Pacer::new(Instant::now(), settings.rate),
         done: Replayed::default(),
         frames: Vec::with_capacity(BATCH_ROWS * 4),
         temperatures: TemperatureSender::START,
     };
-    let progress = Progress::new("sending", rows as u64);
+    let progress = watch.begin("sending", rows as u64);
     let mut timeline = Timeline::default();
     let mut rows = LogRows::open(&settings.log, "reading", &stage, &ReadOptions::DECODE)?;
     timeline.period_us = rows.period_us() as u64;

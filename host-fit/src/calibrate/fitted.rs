@@ -9,7 +9,6 @@ use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::recalibrate::Known;
 use hallstage_calibration::words;
 use hallstage_input::finding::Severity;
-use hallstage_input::interrupt;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::{Projection, SolveError, Solver};
@@ -45,10 +44,16 @@ pub struct Outcome {
     pub refusal: Option<String>,
     /// Whether there is a blob to write: of a fit that is not refused, or that is forced.
     pub has_blob: bool,
+    /// Whether the search was ended before its time.
+    pub is_interrupted: bool,
     limits: Limits,
 }
 
 impl FitOrder {
+    fn is_interrupted(&self) -> bool {
+        self.settings.options.watch.is_stopped()
+    }
+
     /// Fits a log.
     ///
     /// # Errors
@@ -62,7 +67,7 @@ impl FitOrder {
             Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
                 Err(CalibrateError::Unsupported(error))
             }
-            Err(error) if interrupt::requested() => Err(CalibrateError::Interrupted(format!(
+            Err(error) if self.is_interrupted() => Err(CalibrateError::Interrupted(format!(
                 "nothing was written: {error}"
             ))),
             fitted => Ok(fitted),
@@ -79,7 +84,7 @@ impl FitOrder {
         log: &LogReading,
         stage: &Stage,
     ) -> Result<Outcome, CalibrateError> {
-        let is_interrupted = interrupt::requested();
+        let is_interrupted = self.is_interrupted();
         let diagnosis = diagnose_log(&log.dataset, stage, fitted.as_ref());
         if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
             fitted = match fitted {
@@ -95,6 +100,7 @@ impl FitOrder {
             diagnosis,
             refusal: None,
             has_blob: false,
+            is_interrupted,
             limits: self.limits,
         };
         let refusal = match &outcome.fitted {
@@ -157,7 +163,7 @@ impl Outcome {
     pub fn subject(&self) -> Subject<'_> {
         let end = match &self.refusal {
             Some(cause) if !self.has_blob => End::Failed(cause),
-            _ if interrupt::requested() => End::Interrupted,
+            _ if self.is_interrupted => End::Interrupted,
             _ => End::Written,
         };
         Subject {

@@ -1,6 +1,7 @@
 //! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
 use super::arguments::between;
+use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -53,6 +54,7 @@ impl Logs {
     pub(super) fn options(&self, command: ReadOptions) -> ReadOptions {
         ReadOptions {
             split_s: self.split,
+            watch: interrupt::WATCH,
             ..command
         }
     }

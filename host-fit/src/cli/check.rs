@@ -1,6 +1,7 @@
 //! `host-fit check`.
 
 use super::args::{Json, Logs};
+use super::interrupt;
 use super::report::{Report, finish};
 use crate::calibrate::{check_refusal, checked, warnings_of};
 use crate::cli::error::HostError;
@@ -15,7 +16,6 @@ use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_input::finding::{Finding, Severity};
-use hallstage_input::interrupt;
 use hallstage_input::log::ReadOptions;
 use hallstage_solver::solve::{Projection, SolverOptions};
 use std::time::Instant;
@@ -43,13 +43,13 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let stage = args.logs.stage.read()?;
     let log = args.logs.read(&stage, ReadOptions::FIT)?;
     let mut options = SolverOptions::new(Projection::Linear, 1);
-    options.interrupt = Some(interrupt::watch());
+    options.watch = interrupt::watch();
     let settings = FitSettings {
         options,
         ..FitSettings::new(ModelChoice::Auto)
     };
     let fitted = terminal::timed("fit", || fit(&log.dataset, &stage, &settings));
-    if interrupt::requested() {
+    if interrupt::is_requested() {
         return Err(HostError::interrupted("nothing was written"));
     }
     let diagnosis = terminal::timed("diagnosis", || {

@@ -2,6 +2,7 @@
 
 use super::args::StageFile;
 use super::arguments::{choice, hold};
+use super::interrupt;
 use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -10,14 +11,12 @@ use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
 use clap::Args;
 use hallstage_calibration::words;
-use hallstage_input::interrupt;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::posterior::Posterior;
 use runtime::{OnInvalid, ParameterSet};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 /// Arguments of `decode`.
 #[derive(Debug, Args)]
@@ -65,13 +64,9 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         on_invalid: args.hold,
         posterior: posterior.as_ref(),
         format: args.format,
+        watch: interrupt::watch(),
     };
-    let stop = interrupt::watch();
-    let go_on = || match stop.load(Ordering::Relaxed) {
-        false => Ok(()),
-        true => Err(HostError::interrupted("no pose file was written")),
-    };
-    let decode = || pose_file::decode_log(&args.log, &stage, &settings, out, go_on);
+    let decode = || pose_file::decode_log::<HostError>(&args.log, &stage, &settings, out);
     let (counts, log) = terminal::timed("decoding", decode)?;
     let mut summary = format!(
         "{} rows, {} of them with status 0\n",

@@ -1,5 +1,6 @@
 //! `host-fit demo`: the main job on the logs that ship with the program, beside the figures of the paper.
 
+use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::pose_file::{DecodeSettings, PoseFormat, decode_log};
@@ -162,9 +163,10 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         on_invalid: OnInvalid::Zero,
         posterior: None,
         format: PoseFormat::Csv,
+        watch: interrupt::WATCH,
     };
     let poses = Output::create(&files[5])?;
-    decode_log::<HostError>(&files[0], &stage, &decoding, poses, || Ok(()))?;
+    decode_log::<HostError>(&files[0], &stage, &decoding, poses)?;
 
     let in_service = |fit: &Fit| micro(&judged(&fit.set, &service, Zeros::None));
     let paper_s = "  the paper's";

@@ -11,6 +11,7 @@
 //! Every message says what is wrong, where, and what to do. The library's errors have variants; here
 //! they end, and only their message and their status count.
 
+use super::interrupt;
 use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
@@ -19,7 +20,6 @@ use crate::output::{OutputError, OutputProblem};
 use hallstage_calibration::fit::FitError;
 use hallstage_calibration::plan::PlanError;
 use hallstage_calibration::recalibrate::RecalibrateError;
-use hallstage_input::interrupt;
 use hallstage_input::log::{LogError, LogProblem};
 use hallstage_input::source::SourceProblem::Interrupted;
 use hallstage_simulate::recording::RecordError;

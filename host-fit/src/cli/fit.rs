@@ -2,6 +2,7 @@
 
 use super::args::{Json, Logs, Threads, blob_text};
 use super::arguments::{choice, train};
+use super::interrupt;
 use super::report::finish;
 use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
@@ -13,7 +14,6 @@ use crate::report::parameters;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
-use hallstage_input::interrupt;
 use hallstage_input::log::{BadRows, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::draw::Draw;
@@ -146,7 +146,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let mut details = report.details(&[]);
     details.splice(1..1, parameters::tables(&report.parameters, &designed));
     finish(outputs, &details, &warnings, &subject)?;
-    match interrupt::requested() {
+    match interrupt::is_requested() {
         true => Err(HostError::interrupted(format!(
             "{} holds the best so far",
             args.out.display()
@@ -163,7 +163,7 @@ fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
         population: args.population.map_or(usual.population, |n| n as usize),
         generations: args.generations.map_or(usual.generations, |n| n as usize),
         known: start.as_ref().map(Parameters::of_set),
-        interrupt: Some(interrupt::watch()),
+        watch: interrupt::watch(),
         ..usual
     };
     Ok(FitSettings {

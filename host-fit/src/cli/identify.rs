@@ -1,6 +1,7 @@
 //! `host-fit identify`.
 
 use super::args::Json;
+use super::interrupt;
 use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update::{self, Identity};
@@ -24,7 +25,7 @@ pub(super) struct IdentifyArgs {
 /// Asks a controller for its identity and its parameters.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], &Report::default(), [])?;
-    let figures = figures(&update::identify(&args.can)?);
+    let figures = figures(&update::identify(&args.can, interrupt::watch())?);
     args.json.write(&figures)?;
     terminal::print(&as_text(&tables(&figures, &["next", "newest_sequence"])))
 }

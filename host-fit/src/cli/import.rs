@@ -1,6 +1,7 @@
 //! `host-fit import`.
 
 use super::arguments::{between, choice};
+use super::interrupt;
 use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::import::{self, ImportSettings};
@@ -9,7 +10,6 @@ use crate::cli::terminal;
 use crate::report::table::{as_text, tables};
 use clap::Args;
 use hal_adapters::can::Layout;
-use hallstage_input::interrupt;
 use std::path::PathBuf;
 
 /// Arguments of `import`.
@@ -83,6 +83,7 @@ impl ImportArgs {
             interface: self.interface.clone(),
             layout: self.layout,
             skip_bad_lines: self.skip_bad_lines,
+            watch: interrupt::watch(),
         }
     }
 }
@@ -91,7 +92,6 @@ impl ImportArgs {
 pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
     let inputs = [&args.bus, &args.reference, &args.stage].map(PathBuf::as_path);
     super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
-    interrupt::watch();
     let report = import::run(&args.settings())?;
     terminal::print(&as_text(&tables(&report, &[])))?;
     let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";

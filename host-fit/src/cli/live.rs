@@ -1,6 +1,7 @@
 //! `host-fit live`.
 
 use super::arguments::{hold, seconds};
+use super::interrupt;
 use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::live::{self, LiveSettings};
@@ -80,5 +81,5 @@ pub(super) fn run(args: &LiveArgs) -> Result<(), HostError> {
         &Report::default(),
         [args.params.as_path()],
     )?;
-    Ok(live::run(&args.settings())?)
+    Ok(live::run(&args.settings(), interrupt::watch().stop)?)
 }

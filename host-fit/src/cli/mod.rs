@@ -15,9 +15,11 @@ mod identify;
 mod import;
 mod init;
 mod inspect;
+mod interrupt;
 mod key;
 mod live;
 mod plan;
+mod progress;
 mod read_back;
 mod recalibrate;
 mod record;
@@ -35,7 +37,6 @@ use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
 use crate::output::{blob_file, check_writable, is_standard, is_standard_output, keep_apart};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use hallstage_input::progress;
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 use std::ffi::OsString;
@@ -172,7 +173,7 @@ pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>)
 fn run(cli: &Cli) -> u8 {
     terminal::set_level(i8::from(cli.verbose) - i8::from(cli.quiet));
     if !cli.quiet {
-        progress::show();
+        progress::want();
     }
     threads::start(match &cli.command {
         Command::Fit(args) => args.threads.number,

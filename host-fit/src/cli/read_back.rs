@@ -1,6 +1,7 @@
 //! `host-fit read-back`.
 
 use super::identify;
+use super::interrupt;
 use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update;
@@ -24,7 +25,7 @@ pub(super) struct ReadBackArgs {
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
     super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
-    let (identity, blob) = update::read_back(&args.can)?;
+    let (identity, blob) = update::read_back(&args.can, interrupt::watch())?;
     write_atomically(&args.out, &blob)?;
     let parameters = identify::parameters(&identity);
     terminal::print(&format!("{}: runs {parameters}\n", identity.serial))?;

@@ -1,6 +1,7 @@
 //! `host-fit record`.
 
 use super::arguments::seconds;
+use super::interrupt;
 use super::key::KeyFile;
 use super::report::Report;
 use crate::bus::BusAddress;
@@ -37,7 +38,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
         key: args.key.read()?,
         shows: !terminal::is_quiet(),
     };
-    let recorded = recorder::run(&settings)?;
+    let recorded = recorder::run(&settings, interrupt::watch().stop)?;
     if !recorded.is_stopped {
         terminal::warn(&["the controller did not confirm that it sends no more codes".to_owned()]);
     }

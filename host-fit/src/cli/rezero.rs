@@ -1,5 +1,6 @@
 //! `host-fit rezero`.
 
+use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
 use crate::bus::update::{self, Zero};
@@ -30,7 +31,7 @@ pub(super) fn run(args: &RezeroArgs) -> Result<(), HostError> {
         declares_servo_off: args.servo_off,
         clears: args.clear,
     };
-    update::rezero(&args.can, &zero)?;
+    update::rezero(&args.can, &zero, interrupt::watch())?;
     terminal::print(match args.clear {
         true => "the zero is cleared\n",
         false => "re-zeroed: the pose at rest is zero\n",

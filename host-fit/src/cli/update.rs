@@ -1,6 +1,7 @@
 //! `host-fit update`.
 
 use super::identify;
+use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
 use crate::bus::update::{self, Plan, Updated};
@@ -49,6 +50,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
             declares_servo_off: args.servo_off,
             activates: args.activate,
         },
+        interrupt::watch(),
     )?;
     terminal::print(&as_text(&updated))?;
     let (words, transfers) = (updated.repeated_words, updated.repeated_transfers);

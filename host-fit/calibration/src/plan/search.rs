@@ -6,7 +6,6 @@
 
 use super::forecast::forecast;
 use super::run::Run;
-use hallstage_input::progress::Progress;
 use hallstage_input::stage::{AxisMotion, Stage};
 use hallstage_simulate::random::{Purpose, Stream};
 use hallstage_solver::solve::field::forecast::Forecaster;
@@ -73,9 +72,7 @@ pub fn best(
     let mut sets = vec![start(allowed)?];
     let batches = ((BATCH_SECONDS / seconds) as usize).clamp(BATCHES.0, BATCHES.1);
     let mut best = (f64::INFINITY, sets[0]);
-    let progress = Progress::new("planning", batches as u64);
     for batch in 0..batches {
-        progress.reach(batch as u64);
         while sets.len() < BATCH {
             let mut set = best.1;
             // Anew: all six in turn; later one or two.

@@ -1,7 +1,9 @@
 //! The lines of a text with their numbers, in little memory however long it is.
 
 use super::error::{LogError, LogProblem, Place};
+use crate::source::SourceProblem;
 use crate::text::TextReader;
+use crate::watch::{Progress, Watch};
 use sha2::Sha256;
 
 /// Bytes that are read at once.
@@ -23,6 +25,8 @@ pub struct Lines<'a> {
     pub line: usize,
     /// Whether all of the text was read.
     is_whole: bool,
+    watch: Watch<'static>,
+    progress: Progress,
 }
 
 /// A line of a text that is in memory.
@@ -36,7 +40,7 @@ pub(super) struct TextLine<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Of a text.
+    /// The lines of a text.
     pub const fn new(text: TextReader<'a>) -> Self {
         Self {
             text,
@@ -44,6 +48,19 @@ impl<'a> Lines<'a> {
             at: 0,
             line: 0,
             is_whole: false,
+            watch: Watch::NONE,
+            progress: Watch::NONE.begin("", 0),
+        }
+    }
+
+    /// The same, watched while it is read; `work` is being done with it.
+    #[must_use]
+    pub fn watched(self, watch: Watch<'static>, work: &'static str) -> Self {
+        let (_, bytes) = self.text.progress();
+        Self {
+            watch,
+            progress: watch.begin(work, bytes),
+            ..self
         }
     }
 
@@ -94,11 +111,6 @@ impl<'a> Lines<'a> {
         self.is_whole && self.at == self.buffer.len() && !self.buffer.last().is_some_and(is_break)
     }
 
-    /// How many bytes of the file were read, and how many it has; 0 where that is not known.
-    pub fn progress(&self) -> (u64, u64) {
-        self.text.progress()
-    }
-
     pub(super) fn into_hash(self) -> Option<Sha256> {
         self.text.into_hash()
     }
@@ -108,7 +120,13 @@ impl<'a> Lines<'a> {
         self.buffer.drain(..self.at);
         self.at = 0;
         self.is_whole = !self.text.append(&mut self.buffer, bytes)?;
-        Ok(())
+        self.progress.reach(self.text.progress().0);
+        match self.watch.is_stopped() {
+            true => {
+                Err(Place::of(self.text.path(), None).refuse(SourceProblem::Interrupted.into()))
+            }
+            false => Ok(()),
+        }
     }
 
     fn too_long(&self) -> LogError {

@@ -9,7 +9,6 @@ use super::table::Table;
 use super::{BadRows, ReadOptions, SaturatedCodes};
 use crate::dataset::Row;
 use crate::finding::{Finding, Kind};
-use crate::progress::Progress;
 use crate::stage::Stage;
 use crate::text::TextReader;
 use sha2::Sha256;
@@ -18,9 +17,6 @@ use std::path::{Path, PathBuf};
 /// Mean distance of voltages from whole codes that passes in silence: those that were computed from
 /// codes and written with few digits stay below it, those of another instrument have 0.25.
 const BETWEEN_CODES: f64 = 0.15;
-
-/// So many lines are read before the progress is shown anew.
-const LINES_SHOWN: usize = 4096;
 
 /// A row of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +37,6 @@ pub struct LogRows<'a> {
     order: Order,
     skipped: Skipped,
     options: ReadOptions,
-    progress: Progress,
 }
 
 /// What is known of a log at its end.
@@ -80,6 +75,7 @@ impl<'a> LogRows<'a> {
         options: &ReadOptions,
     ) -> Result<Self, LogError> {
         let mut table = Table::open(text, |name| stage.log.knows(name))?;
+        table.lines = table.lines.watched(options.watch, what);
         let columns = header::columns(&table.head, stage, options.reference)?;
         if columns.movement.is_some() && options.split_s.is_some() {
             return Err(Place::of(table.head.path, None).refuse(LogProblem::SplitWithMovements));
@@ -96,7 +92,6 @@ impl<'a> LogRows<'a> {
             reader: RowReader::new(columns, stage, keep_saturated),
             skipped: Skipped::default(),
             options: *options,
-            progress: Progress::new(what, table.lines.progress().1),
             table,
         })
     }
@@ -113,9 +108,6 @@ impl<'a> LogRows<'a> {
     pub fn next_row(&mut self) -> Result<Option<LogRow>, LogError> {
         while self.table.next_row()? {
             let (cells, line) = (&self.table.row, self.table.lines.line);
-            if line.is_multiple_of(LINES_SHOWN) {
-                self.progress.reach(self.table.lines.progress().0);
-            }
             let movement = self.reader.movement(cells);
             let known = movement.as_ref().map_or(None, |movement| *movement);
             let row = match movement.and_then(|_| self.reader.t_us(cells)) {

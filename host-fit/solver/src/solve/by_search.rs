@@ -102,7 +102,7 @@ fn search(
     let options = SearchOptions {
         first: &first,
         stall,
-        interrupt: options.interrupt,
+        watch: options.watch,
         ..SearchOptions::new(options.seed, options.population, options.generations)
     };
     kind.minimize(objective, &options)

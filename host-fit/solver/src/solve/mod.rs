@@ -42,9 +42,9 @@ pub mod search;
 use crate::problem::Problem;
 use crate::problem::model::ParameterId;
 use crate::problem::parameters::Parameters;
+use hallstage_input::watch::Watch;
 use search::kind::SearchKind;
 use search::run::Checkpoint;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// How much of the problem is solved in closed form.
@@ -136,12 +136,12 @@ pub struct SolverOptions {
     pub generations: usize,
     /// Known parameters to start from, such as those of an earlier blob.
     pub known: Option<Parameters>,
-    /// Set by Ctrl-C: a search then ends and keeps the best so far.
-    pub interrupt: Option<&'static AtomicBool>,
+    /// Shows how far a search is, and can end it: it keeps the best so far.
+    pub watch: Watch<'static>,
 }
 
 impl SolverOptions {
-    /// The usual size of a population for a form, nothing known, no interrupt.
+    /// The usual size of a population for a form, nothing known, watched by nobody.
     pub const fn new(projection: Projection, seed: u64) -> Self {
         let (population, generations) = by_search::default_size(projection);
         Self {
@@ -150,7 +150,7 @@ impl SolverOptions {
             population,
             generations,
             known: None,
-            interrupt: None,
+            watch: Watch::NONE,
         }
     }
 }

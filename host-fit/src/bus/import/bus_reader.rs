@@ -9,7 +9,6 @@ use hal_adapters::candump::{LineError, LogLine};
 use hallstage_input::log::LogError;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
-use hallstage_input::progress::Progress;
 use hallstage_input::stage::{CodeScale, Stage};
 use hallstage_input::text::TextReader;
 
@@ -38,11 +37,9 @@ pub(super) fn read(
         counts: BusCounts::default(),
     };
     let text = TextReader::open(&settings.bus).map_err(LogError::from)?;
-    let progress = Progress::new("reading the bus", text.progress().1);
-    let mut lines = Lines::new(text);
+    let mut lines = Lines::new(text).watched(settings.watch, "reading the bus");
     while let Some(line) = lines.next_line()? {
         reader.take_line(&String::from_utf8_lossy(line))?;
-        progress.reach(lines.progress().0);
         if reader.clock.timed() > TICKS_MAX {
             return Err(ImportError::TooLong {
                 path: settings.bus.clone(),

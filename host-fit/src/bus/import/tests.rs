@@ -112,6 +112,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
         interface: None,
         layout: None,
         skip_bad_lines: false,
+        watch: Watch::NONE,
     };
     Import {
         _folder: folder,

@@ -10,7 +10,6 @@ use crate::output::record_file::RecordFile;
 use crate::output::{OutputError, blob_file, is_standard_output};
 use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
 use hal_adapters::candump::LogLine;
-use hallstage_input::interrupt;
 use runtime::{ParameterSet, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -25,7 +24,7 @@ const SEND_DEADLINE: Duration = Duration::from_millis(1);
 ///
 /// # Errors
 /// See [`LiveError`]. An interface that goes down is waited for, not an error.
-pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
+pub fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError> {
     let set = blob_file::read(&settings.params)?;
     check_serial(&set, settings)?;
     let node = NodeSettings {
@@ -48,7 +47,6 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
         Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
     };
-    let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
         node: Node::new(decoder, &node),

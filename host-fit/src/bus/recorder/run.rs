@@ -8,7 +8,6 @@ use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::table::TABLE;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use hal_adapters::candump::LogLine;
-use hallstage_input::interrupt;
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -26,7 +25,7 @@ const SHOWN_EVERY: Duration = Duration::from_millis(200);
 ///
 /// # Errors
 /// See [`RecorderError`]. Nothing is written unless codes came.
-pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
+pub fn run(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, RecorderError> {
     let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
     let mut session = Session {
         settings,
@@ -43,7 +42,6 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
         started: Instant::now(),
         shown: None,
     };
-    let stop = interrupt::watch();
     if let Err(error) = session.ask(true) {
         session.file.discard();
         return Err(error);

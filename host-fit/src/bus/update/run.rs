@@ -6,8 +6,7 @@ use super::{
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use hal_adapters::can::{BusFrame, Message};
-use hallstage_input::interrupt;
-use hallstage_input::progress::Progress;
+use hallstage_input::watch::Watch;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -18,16 +17,19 @@ const SEND_DEADLINE: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn identify(address: &BusAddress) -> Result<Identity, UpdateRunError> {
-    hold(address, "asking", |talk, _| identity::identify(talk))
+pub fn identify(address: &BusAddress, watch: Watch<'_>) -> Result<Identity, UpdateRunError> {
+    hold(address, watch, "asking", |talk, _| identity::identify(talk))
 }
 
 /// Reads the blob that the node runs.
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn read_back(address: &BusAddress) -> Result<(Identity, Vec<u8>), UpdateRunError> {
-    hold(address, "reading", |talk, progress| {
+pub fn read_back(
+    address: &BusAddress,
+    watch: Watch<'_>,
+) -> Result<(Identity, Vec<u8>), UpdateRunError> {
+    hold(address, watch, "reading", |talk, progress| {
         identity::read_back(talk, progress)
     })
 }
@@ -36,8 +38,12 @@ pub fn read_back(address: &BusAddress) -> Result<(Identity, Vec<u8>), UpdateRunE
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn update(address: &BusAddress, plan: &Plan) -> Result<Updated, UpdateRunError> {
-    hold(address, "updating", |talk, progress| {
+pub fn update(
+    address: &BusAddress,
+    plan: &Plan,
+    watch: Watch<'_>,
+) -> Result<Updated, UpdateRunError> {
+    hold(address, watch, "updating", |talk, progress| {
         script::update(talk, plan, progress)
     })
 }
@@ -46,8 +52,8 @@ pub fn update(address: &BusAddress, plan: &Plan) -> Result<Updated, UpdateRunErr
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn rezero(address: &BusAddress, zero: &Zero) -> Result<(), UpdateRunError> {
-    hold(address, "re-zeroing", |talk, _| {
+pub fn rezero(address: &BusAddress, zero: &Zero, watch: Watch<'_>) -> Result<(), UpdateRunError> {
+    hold(address, watch, "re-zeroing", |talk, _| {
         super::on::rezero(talk, zero)
     })
 }
@@ -101,18 +107,19 @@ impl Link for Interface<'_> {
 /// Runs a script on an interface with a progress bar.
 fn hold<T>(
     address: &BusAddress,
+    watch: Watch<'_>,
     what: &'static str,
     talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
         bus: Bus::open(&address.interface, address.node, &[Message::Answer])?,
         started: Instant::now(),
-        stop: interrupt::watch(),
+        stop: watch.stop,
         failure: None,
     };
     let (mut talk, mut bar) = (Talk::new(link, now_token()), None);
     let result = talks(&mut talk, &mut |done, total| {
-        bar.get_or_insert_with(|| Progress::new(what, total))
+        bar.get_or_insert_with(|| watch.begin(what, total))
             .reach(done);
     });
     result.map_err(|cause| match talk.link.failure.take() {

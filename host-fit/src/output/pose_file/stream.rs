@@ -4,6 +4,7 @@ use super::{PoseRow, StatusCounts, npy, text, uncertainty};
 use crate::output::{Output, OutputError};
 use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions};
 use hallstage_input::stage::Stage;
+use hallstage_input::watch::Watch;
 use hallstage_solver::solve::field::posterior::Posterior;
 use runtime::{AnyDecoder, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
@@ -32,6 +33,8 @@ pub struct DecodeSettings<'a> {
     pub posterior: Option<&'a Posterior>,
     /// How poses are written.
     pub format: PoseFormat,
+    /// Shows how far the decoding is, and can end it.
+    pub watch: Watch<'static>,
 }
 
 impl DecodeSettings<'_> {
@@ -54,22 +57,25 @@ impl DecodeSettings<'_> {
 
 /// Decodes a log into `out` as a controller would, one servo period after the other. What is invalid is
 /// zero or held; nothing is held, and no frame is missed, from one movement to the next. Tells how many rows have which status,
-/// and what is odd about the log. `go_on` is asked now and then and can end it.
+/// and what is odd about the log.
 ///
 /// # Errors
-/// Those of the log, when the rows above its first fault are done, of `go_on` and of the output,
+/// Those of the log, when the rows above its first fault are done, and those of the output,
 /// which then is as it was before. A pipe keeps what was written to it.
 pub fn decode_log<E: From<LogError> + From<OutputError>>(
     log: &Path,
     stage: &Stage,
     settings: &DecodeSettings<'_>,
     mut out: Output,
-    go_on: impl Fn() -> Result<(), E>,
 ) -> Result<(StatusCounts, LogEnd), E> {
     let decoder = settings.decoder;
     let mut tracker = PoseTracker::new(decoder, settings.on_invalid);
     let mut counts = StatusCounts::default();
-    let mut log = LogRows::open(log, "decoding", stage, &ReadOptions::DECODE)?;
+    let options = ReadOptions {
+        watch: settings.watch,
+        ..ReadOptions::DECODE
+    };
+    let mut log = LogRows::open(log, "decoding", stage, &options)?;
     let mut bytes = settings.header(0);
     let rows = loop {
         let row = match log.next_row() {
@@ -89,7 +95,6 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
         counts.add(row.reading.status);
         settings.write(&row, &mut bytes);
         if bytes.len() >= PIECE_BYTES {
-            go_on()?;
             out.write(&bytes)?;
             bytes.clear();
         }

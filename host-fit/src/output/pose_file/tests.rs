@@ -1,5 +1,6 @@
 use super::*;
 use hallstage_input::dataset::Dataset;
+use hallstage_input::watch::Watch;
 use proptest::prelude::*;
 use runtime::{AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, Status, VerticalPose};
 use std::path::Path;
@@ -155,8 +156,9 @@ fn decoded_file(log: &Path, on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u
         on_invalid,
         posterior: None,
         format,
+        watch: Watch::NONE,
     };
-    let decoded = decode_log::<Box<dyn std::error::Error>>(log, &stage, &settings, out, || Ok(()));
+    let decoded = decode_log::<Box<dyn std::error::Error>>(log, &stage, &settings, out);
     let (counts, end) = decoded.expect("sound");
     assert_eq!((end.skipped_rows, end.warnings), (0, Vec::new()));
     (std::fs::read(&path).expect("written"), counts)

@@ -15,7 +15,6 @@ use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
 use crate::solve::robust::{HALF, Loss};
 use hallstage_input::dataset::Dataset;
-use hallstage_input::interrupt;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 use runtime::Temperature;
@@ -162,7 +161,6 @@ impl WhiteFit {
     }
 
     /// The same as [`WhiteFit::new`] with weights by a loss, from a start that bad rows don't bend.
-    /// An interrupt ends the rounds early.
     ///
     /// # Errors
     /// See [`FieldFitError`].
@@ -177,7 +175,7 @@ impl WhiteFit {
         for _ in 0..ROUNDS_MAX {
             let weights = fit.weights_by(loss);
             let mut pairs = fit.weights.iter().zip(&weights);
-            if pairs.all(|(a, b)| (a - b).abs() < WEIGHT_SETTLED) || interrupt::requested() {
+            if pairs.all(|(a, b)| (a - b).abs() < WEIGHT_SETTLED) {
                 break;
             }
             fit.rows = Rows::weighted(dataset, selected, &weights).into();

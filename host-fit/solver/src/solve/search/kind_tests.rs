@@ -3,6 +3,7 @@ use crate::solve::search::cost::known::{Known, rastrigin, rosenbrock, sphere};
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use crate::solve::search::run::StopReason;
 use hallstage_input::stage::Range;
+use hallstage_input::watch::Watch;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -143,7 +144,10 @@ fn an_interrupt_ends_every_search_with_what_it_has() {
     let flag = AtomicBool::new(true);
     for kind in SearchKind::ALL {
         let options = SearchOptions {
-            interrupt: Some(&flag),
+            watch: Watch {
+                stop: &flag,
+                ..Watch::NONE
+            },
             ..SearchOptions::new(1, 10, usize::MAX)
         };
         let found = kind.minimize(&function, &options);

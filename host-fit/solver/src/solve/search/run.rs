@@ -4,8 +4,7 @@ use super::cost::CostFunction;
 use super::mixing::Mixing;
 use super::random::stream;
 use super::tlbo::Population;
-use hallstage_input::progress::Progress;
-use std::sync::atomic::{AtomicBool, Ordering};
+use hallstage_input::watch::Watch;
 
 /// How a search starts and when it stops. It checks after each generation, in the order of
 /// [`StopReason`].
@@ -24,8 +23,8 @@ pub struct SearchOptions<'a> {
     pub evaluations: Option<usize>,
     /// Stop once the best cost hardly falls.
     pub stall: Option<Stall>,
-    /// Stop once this flag is set, by Ctrl-C or another thread.
-    pub interrupt: Option<&'a AtomicBool>,
+    /// Shows how far the search is, and can stop it.
+    pub watch: Watch<'a>,
 }
 
 impl SearchOptions<'_> {
@@ -38,7 +37,7 @@ impl SearchOptions<'_> {
             first: &[],
             evaluations: None,
             stall: None,
-            interrupt: None,
+            watch: Watch::NONE,
         }
     }
 }
@@ -55,7 +54,7 @@ pub struct Stall {
 /// Why a search stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// The interrupt flag was set: the best so far is kept.
+    /// The watch ended the search: the best so far is kept.
     Interrupted,
     /// The number of generations was reached.
     Generations,
@@ -113,7 +112,7 @@ pub(super) fn run(
     let streams = |generation, phase, k| stream(options.seed, generation, phase, k);
     let mut population =
         Population::new(mixing, streams, function, options.population, options.first);
-    let progress = Progress::new("searching", options.generations as u64);
+    let progress = options.watch.begin("searching", options.generations as u64);
     let mut history = Vec::new();
     let reason = loop {
         history.push(Checkpoint {
@@ -143,8 +142,7 @@ impl SearchOptions<'_> {
     fn stop(&self, history: &[Checkpoint]) -> Option<StopReason> {
         let now = history.last()?;
         let generations = history.len() - 1;
-        let interrupt = self.interrupt;
-        if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+        if self.watch.is_stopped() {
             return Some(StopReason::Interrupted);
         }
         if generations >= self.generations {
@@ -163,6 +161,7 @@ impl SearchOptions<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::AtomicBool;
 
     #[test]
     fn each_criterion_stops_at_its_limit_and_not_before() {
@@ -189,7 +188,10 @@ mod tests {
             ..none
         };
         let interrupted = SearchOptions {
-            interrupt: Some(&flag),
+            watch: Watch {
+                stop: &flag,
+                ..Watch::NONE
+            },
             ..generations(0)
         };
         let falls = [8.0, 4.0, 2.0];
