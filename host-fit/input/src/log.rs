@@ -36,9 +36,7 @@ use crate::stage::Stage;
 use crate::text::TextReader;
 use crate::watch::Watch;
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 /// What to do with a row that has a bad cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -114,43 +112,18 @@ impl ReadOptions {
     };
 }
 
-/// What [`read`] gives.
+/// Logs that were read.
 #[derive(Debug, Default)]
 pub struct LogReading {
     /// The rows of all logs, or a sample of them.
     pub dataset: Dataset,
     /// What is odd about the logs, in their order.
     pub warnings: Vec<Finding>,
-    /// How many rows were left out; the warnings say why.
+    /// Number of rows that were left out; the warnings say why.
     pub skipped_rows: usize,
-    options: ReadOptions,
-    /// Where the logs can be read again.
-    again: Vec<(PathBuf, Again)>,
 }
 
-/// How a log can be read again.
-#[derive(Debug)]
-enum Again {
-    /// From its file.
-    File,
-    /// From a copy, as its own file can be read but once.
-    Copy(File),
-    /// From memory.
-    Bytes(Arc<[u8]>),
-}
-
-impl Again {
-    fn open(&self, path: &Path) -> Result<TextReader<'_>, LogError> {
-        Ok(match self {
-            Self::File => TextReader::open(path)?,
-            Self::Copy(copy) => TextReader::open_copy(copy, path)?,
-            Self::Bytes(bytes) => TextReader::of_reader(&**bytes, path)?,
-        })
-    }
-}
-
-/// Reads the logs, in this order, into one dataset: in little memory however long they are, where
-/// `rows_max` says so. They can be read again by [`LogReading::each_row`].
+/// Reads the logs, in this order, into one dataset. With `rows_max` memory does not grow with the logs.
 ///
 /// # Errors
 /// Every variant of [`LogError`]; the first fault of the first bad log.
@@ -159,51 +132,49 @@ pub fn read<P: AsRef<Path>>(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let mut again = Vec::new();
-    let texts = paths.iter().map(|path| {
-        let path = path.as_ref();
-        let (text, copy) = match options.rows_max {
-            Some(_) => TextReader::open_to_read_again(path)?,
-            None => (TextReader::open(path)?, None),
-        };
-        let place = copy.map_or(Again::File, Again::Copy);
-        again.push((path.to_path_buf(), place));
-        Ok(text)
-    });
-    let reading = read_texts(texts, stage, options, |_, _| ())?;
-    Ok(LogReading { again, ..reading })
+    read_each(paths, stage, options, |_, _| ())
 }
 
-/// As [`read`], and gives all rows away: `take` gets each with the number of its log.
+/// The same; `take` gets every row, with the number of its log.
 ///
 /// # Errors
-/// As [`read`].
+/// Those of [`read`].
 pub fn read_each<P: AsRef<Path>>(
     paths: &[P],
     stage: &Stage,
     options: &ReadOptions,
     take: impl FnMut(usize, &LogRow),
 ) -> Result<LogReading, LogError> {
-    let texts = paths
-        .iter()
-        .map(|path| Ok(TextReader::open(path.as_ref())?));
-    read_texts(texts, stage, options, take)
+    let open = |path: &P| Ok(TextReader::open(path.as_ref())?);
+    read_texts(paths.iter().map(open), stage, options, take)
 }
 
-/// Reads one log that is in memory, plain or gzip; `path` is only named in errors.
+/// Reads one log that is in memory, plain or gzip; `path` only names it in errors.
 ///
 /// # Errors
-/// As [`read`], without those of opening the file.
+/// Those of [`read`], without those of opening the file.
 pub fn read_bytes(
     bytes: &[u8],
     path: &Path,
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let text = TextReader::of_reader(bytes, path).map_err(LogError::from);
-    let reading = read_texts([text], stage, options, |_, _| ())?;
-    let again = vec![(path.to_path_buf(), Again::Bytes(bytes.into()))];
-    Ok(LogReading { again, ..reading })
+    read_each_of_bytes(bytes, path, stage, options, |_, _| ())
+}
+
+/// The same; `take` gets every row, with the number of the log: 0.
+///
+/// # Errors
+/// Those of [`read_bytes`].
+pub fn read_each_of_bytes(
+    bytes: &[u8],
+    path: &Path,
+    stage: &Stage,
+    options: &ReadOptions,
+    take: impl FnMut(usize, &LogRow),
+) -> Result<LogReading, LogError> {
+    let text = TextReader::from_reader(bytes, path).map_err(LogError::from);
+    read_texts([text], stage, options, take)
 }
 
 fn read_texts<'t>(
@@ -212,10 +183,7 @@ fn read_texts<'t>(
     options: &ReadOptions,
     mut take: impl FnMut(usize, &LogRow),
 ) -> Result<LogReading, LogError> {
-    let mut reading = LogReading {
-        options: *options,
-        ..LogReading::default()
-    };
+    let mut reading = LogReading::default();
     let mut sampler = Sampler::new(options.rows_max.unwrap_or(usize::MAX));
     let mut hash = Sha256::new();
     let mut logs = 0;
@@ -261,52 +229,6 @@ fn read_texts<'t>(
         reading.warnings.push(Finding::new(excerpt));
     }
     Ok(reading)
-}
-
-impl LogReading {
-    /// Reads the logs anew in another way, as [`read_each`] would; of what is read nothing can be read again.
-    ///
-    /// # Errors
-    /// As [`read`].
-    pub fn read_anew(
-        &self,
-        stage: &Stage,
-        options: &ReadOptions,
-        take: impl FnMut(usize, &LogRow),
-    ) -> Result<Self, LogError> {
-        let texts = self.again.iter().map(|(path, again)| again.open(path));
-        read_texts(texts, stage, options, take)
-    }
-
-    /// How the logs were read.
-    pub const fn options(&self) -> &ReadOptions {
-        &self.options
-    }
-
-    /// Reads the logs again, as they were read by [`read`]; `take` as for [`read_each`].
-    ///
-    /// # Errors
-    /// As [`read`]; `Changed` where a log has other rows now.
-    pub fn each_row(
-        &self,
-        stage: &Stage,
-        mut take: impl FnMut(usize, &LogRow),
-    ) -> Result<(), LogError> {
-        let sources = self.again.iter().zip(&self.dataset.logs);
-        for (log, ((path, again), source)) in sources.enumerate() {
-            let text = again.open(path)?;
-            let mut rows = LogRows::new(text, "judging", stage, &self.options)?;
-            let mut count = 0;
-            while let Some(row) = rows.next_row()? {
-                count += 1;
-                take(log, &row);
-            }
-            if source.rows_read != count {
-                return Err(Place::of(path, None).refuse(LogProblem::Changed));
-            }
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A file as bytes, read whole or piece by piece. `-` is standard input.
 
 use std::fs::File;
-use std::io::{Cursor, ErrorKind, Read, Seek, Write};
+use std::io::{Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// The name of standard input on the command line, and in messages.
@@ -120,8 +120,6 @@ pub fn read_start(path: &Path, most: u64) -> Result<Vec<u8>, SourceError> {
 /// [`SourceProblem`]s inside.
 pub(super) struct Raw<'a> {
     file: Box<dyn Read + Send + 'a>,
-    /// Takes all that is read.
-    copy: Option<File>,
     /// Bytes that were read.
     pub(super) read: u64,
     /// Bytes of the file; 0 where that is not known.
@@ -135,7 +133,7 @@ impl<'a> Raw<'a> {
     /// `NotFound`, `IsFolder`, `Unreadable`.
     pub(super) fn open(path: &Path) -> Result<Self, SourceProblem> {
         if path.as_os_str() == STANDARD_INPUT.0 {
-            return Ok(Self::of_reader(std::io::stdin()));
+            return Ok(Self::from_reader(std::io::stdin()));
         }
         let file = match File::open(path) {
             Err(_) if path.is_dir() => return Err(SourceProblem::IsFolder),
@@ -144,49 +142,26 @@ impl<'a> Raw<'a> {
         let total = file.metadata().map_or(0, |metadata| metadata.len());
         Ok(Self {
             total,
-            ..Self::of_reader(file)
+            ..Self::from_reader(file)
         })
     }
 
-    /// Opens a file. What is no regular file, as standard input, a pipe or a device, is copied to
-    /// an unnamed file while it is read.
-    ///
-    /// # Errors
-    /// As [`Self::open`], and those of making the copy.
-    pub(super) fn open_copied(path: &Path) -> Result<(Self, Option<File>), SourceProblem> {
-        let raw = Self::open(path)?;
-        // The length is known of regular files alone.
-        if raw.total > 0 {
-            return Ok((raw, None));
-        }
-        let again = tempfile::tempfile()?;
-        let copy = Some(again.try_clone()?);
-        Ok((Self { copy, ..raw }, Some(again)))
-    }
-
     /// What a reader gives.
-    pub(super) fn of_reader(reader: impl Read + Send + 'a) -> Self {
+    pub(super) fn from_reader(reader: impl Read + Send + 'a) -> Self {
         Self {
             file: Box::new(reader),
-            copy: None,
             read: 0,
             total: 0,
         }
     }
 
-    /// With the bytes that were taken from its start put back.
-    ///
-    /// # Errors
-    /// Those of the copy.
-    pub(super) fn preceded_by(mut self, start: Vec<u8>) -> std::io::Result<Self> {
-        if let Some(copy) = &mut self.copy {
-            copy.rewind()?;
-        }
-        Ok(Self {
+    /// The same with bytes that were taken from its start put back.
+    pub(super) fn preceded_by(self, start: Vec<u8>) -> Self {
+        Self {
             file: Box::new(Cursor::new(start).chain(self.file)),
             read: 0,
             ..self
-        })
+        }
     }
 }
 
@@ -196,9 +171,6 @@ impl Read for Raw<'_> {
             match self.file.read(bytes) {
                 Ok(read) => {
                     self.read += read as u64;
-                    if let (Some(copy), Some(bytes)) = (&mut self.copy, bytes.get(..read)) {
-                        copy.write_all(bytes)?;
-                    }
                     return Ok(read);
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}

@@ -7,8 +7,7 @@ use super::encoding::Utf16;
 use super::source::{self, Raw, SourceError, SourceProblem};
 use super::unpack::Unpacked;
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::{Chain, Cursor, Read, Seek};
+use std::io::{Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// Written at the start of UTF-8 files by some programs.
@@ -35,32 +34,12 @@ impl<'a> TextReader<'a> {
         Self::new(raw, path)
     }
 
-    /// Opens a file, and the copy that is made of it while it is read, if it can be read but once: see
-    /// [`Self::open_copy`].
-    ///
-    /// # Errors
-    /// As [`Self::open`], and those of the copy.
-    pub fn open_to_read_again(path: &Path) -> Result<(Self, Option<File>), SourceError> {
-        let (raw, copy) = Raw::open_copied(path).map_err(|problem| problem.of(path))?;
-        Ok((Self::new(raw, path)?, copy))
-    }
-
-    /// Opens the copy of a file that was read; `path` is only named in errors.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub fn open_copy(copy: &'a File, path: &Path) -> Result<Self, SourceError> {
-        let mut copy = copy;
-        (copy.rewind()).map_err(|error| SourceProblem::from(error).of(path))?;
-        Self::of_reader(copy, path)
-    }
-
     /// The text that a reader gives, as bytes in memory do, plain or gzip; `path` is only named in errors.
     ///
     /// # Errors
     /// `Binary`, `Unreadable`, and those of gzip.
-    pub fn of_reader(reader: impl Read + Send + 'a, path: &Path) -> Result<Self, SourceError> {
-        Self::new(Raw::of_reader(reader), path)
+    pub fn from_reader(reader: impl Read + Send + 'a, path: &Path) -> Result<Self, SourceError> {
+        Self::new(Raw::from_reader(reader), path)
     }
 
     fn new(raw: Raw<'a>, path: &Path) -> Result<Self, SourceError> {

@@ -35,7 +35,7 @@ impl<'a> Unpacked<'a> {
             .take(GZIP_MAGIC.len() as u64)
             .read_to_end(&mut start)?;
         let is_gzip = start == GZIP_MAGIC;
-        let whole = BufReader::with_capacity(BUFFER_BYTES, raw.preceded_by(start)?);
+        let whole = BufReader::with_capacity(BUFFER_BYTES, raw.preceded_by(start));
         let source = match is_gzip {
             true => Source::Gzip(Box::new(MultiGzDecoder::new(whole))),
             false => Source::Plain(whole),
@@ -99,7 +99,7 @@ mod tests {
         let packed = encoder.finish().expect("in memory");
         for kind in [ErrorKind::OutOfMemory, ErrorKind::PermissionDenied] {
             let half = packed[..500].chain(Failing(kind));
-            let mut unpacked = Unpacked::new(Raw::of_reader(half)).expect("gzip");
+            let mut unpacked = Unpacked::new(Raw::from_reader(half)).expect("gzip");
             let error = unpacked.read_to_end(&mut Vec::new()).expect_err("refused");
             let SourceProblem::Unreadable { source } = error.into() else {
                 panic!("another problem");

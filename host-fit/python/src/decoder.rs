@@ -220,11 +220,10 @@ impl Decoder {
     /// The words of all rows of a log.
     fn of_log(&self, py: Python<'_>, log: &Log, on_invalid: OnInvalid) -> PyResult<Vec<u32>> {
         let decoder = &self.decoder;
-        let options = log.options(ReadOptions::DECODE);
         let decoded = work::run(py, || {
             let mut tracker = PoseTracker::new(decoder, on_invalid);
             let mut words = Vec::new();
-            let read = log.reading.read_anew(&log.designed, &options, |_, row| {
+            let read = log.read_for(ReadOptions::DECODE, |_, row| {
                 if row.begins {
                     tracker.forget();
                 }

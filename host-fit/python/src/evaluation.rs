@@ -48,11 +48,10 @@ impl Evaluation {
             return Err(wrong("limit", "a factor above zero is needed"));
         }
         let order = EvalOrder { zeros, limit };
-        let options = log.options(Evaluated::OPTIONS);
         let (designed, logs) = (&log.designed, log.reading.dataset.logs.len());
         let evaluated = work::run(py, || {
             Evaluated::new(of_blob, designed, order, logs, |take| {
-                log.reading.read_anew(designed, &options, take)
+                log.read_for(Evaluated::OPTIONS, take)
             })
         })?;
         let evaluated = evaluated.map_err(|error| of_log(py, &error))?;

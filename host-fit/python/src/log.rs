@@ -8,7 +8,9 @@ use crate::work;
 use host_fit::calibrate::warnings_of;
 use host_fit::input::dataset::Row;
 use host_fit::input::log::layout::LogLayout;
-use host_fit::input::log::{self, BadRows, LogReading, ReadOptions, ReferenceUse};
+use host_fit::input::log::{
+    self, BadRows, LogError, LogReading, LogRow, ReadOptions, ReferenceUse,
+};
 use host_fit::input::stage::{Stage as Designed, TemperatureTable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -17,6 +19,14 @@ use runtime::frame::MISSING_CODE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Where a log can be read again.
+pub enum Source {
+    /// Its files.
+    Files(Vec<PathBuf>),
+    /// The text of a log in memory, and its name.
+    Text(Vec<u8>, PathBuf),
+}
+
 /// Logs of a stage, read and checked: rows in SI units, by movement.
 ///
 /// Of more than 125,000 rows it holds a sample, of whole runs; `fit` works on these. `evaluate` and a decoder
@@ -24,6 +34,8 @@ use std::sync::Arc;
 #[pyclass(frozen, subclass, module = "hallstage")]
 pub struct Log {
     pub reading: Arc<LogReading>,
+    pub source: Source,
+    pub options: ReadOptions,
     /// The stage with the columns of this log.
     pub designed: Arc<Designed>,
     pub stage: Py<Stage>,
@@ -81,6 +93,8 @@ pub fn read_log(
     let reading = reading.map_err(|error| of_log(py, &error))?;
     Ok(Log {
         reading: Arc::new(reading),
+        source: Source::Files(paths),
+        options,
         designed,
         stage,
     })
@@ -331,6 +345,8 @@ impl Log {
         let reading = reading.map_err(|error| of_arrays(py, &error, arguments))?;
         Ok(Self {
             reading: Arc::new(reading),
+            source: Source::Text(text.to_vec(), name.to_owned()),
+            options: *options,
             designed,
             stage,
         })
@@ -356,14 +372,26 @@ impl Log {
             .all(|log| log.has_reference)
     }
 
-    /// How the log is read for a command, beyond what the user said.
-    pub fn options(&self, command: ReadOptions) -> ReadOptions {
-        let own = self.reading.options();
-        ReadOptions {
-            bad_rows: own.bad_rows,
-            split_s: own.split_s,
-            watch: own.watch,
+    /// Reads the log again for a command, with the options of the user; `take` gets every row with the number
+    /// of its log.
+    ///
+    /// # Errors
+    /// See [`LogError`].
+    pub fn read_for(
+        &self,
+        command: ReadOptions,
+        take: impl FnMut(usize, &LogRow),
+    ) -> Result<LogReading, LogError> {
+        let options = &ReadOptions {
+            bad_rows: self.options.bad_rows,
+            split_s: self.options.split_s,
+            watch: self.options.watch,
             ..command
+        };
+        let stage = &self.designed;
+        match &self.source {
+            Source::Files(paths) => log::read_each(paths, stage, options, take),
+            Source::Text(text, name) => log::read_each_of_bytes(text, name, stage, options, take),
         }
     }
 
@@ -372,9 +400,7 @@ impl Log {
         if self.has_reference() {
             return Ok(());
         }
-        let options = self.options(ReadOptions::FIT);
-        let again = self.reading.read_anew(&self.designed, &options, |_, _| ());
-        match again {
+        match self.read_for(ReadOptions::FIT, |_, _| ()) {
             Ok(_) => Ok(()),
             Err(error) => Err(of_log(py, &error)),
         }

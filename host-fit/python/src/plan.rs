@@ -3,12 +3,12 @@
 use crate::arrays::{slice, table};
 use crate::choice::chosen;
 use crate::error::{internal, of_log, of_output, wrong};
-use crate::log::Log;
+use crate::log::{Log, Source};
 use crate::minimize::whole;
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibration::plan::{self, PERIODS_MAX, SECONDS_MAX};
-use host_fit::input::log::{self, LogReading, ReadOptions};
+use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage as Designed;
 use host_fit::input::text::TextReader;
 use host_fit::output::write_atomically;
@@ -127,14 +127,18 @@ pub fn simulate<'py>(
     let recorded = work::run(py, || {
         let recording = record_stage(&designed, run, hour, seed)?;
         let csv = log_csv(&recording, &designed);
-        Ok((read(csv, &designed), recording.truth.concat()))
+        let name = Path::new("simulated");
+        let reading = log::read_bytes(csv.as_bytes(), name, &designed, &ReadOptions::FIT);
+        Ok((reading, csv, recording.truth.concat()))
     })?;
-    let (reading, truth) = recorded.map_err(|error: RecordError| match error {
+    let (reading, csv, truth) = recorded.map_err(|error: RecordError| match error {
         RecordError::NoTemperature => wrong("hour", error),
         error => wrong("run", error),
     })?;
     let log = Log {
         reading: Arc::new(reading.map_err(|error| of_log(py, &error))?),
+        source: Source::Text(csv.into_bytes(), "simulated".into()),
+        options: ReadOptions::FIT,
         designed,
         stage,
     };
@@ -142,15 +146,6 @@ pub fn simulate<'py>(
     Bound::new(
         py,
         PyClassInitializer::from(log).add_subclass(SimulatedLog { truth }),
-    )
-}
-
-fn read(csv: String, designed: &Designed) -> Result<LogReading, log::LogError> {
-    log::read_bytes(
-        csv.as_bytes(),
-        Path::new("simulated"),
-        designed,
-        &ReadOptions::FIT,
     )
 }
 
@@ -167,7 +162,7 @@ fn run_of(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
         Ok(plan) => plan.get().csv(),
         Err(_) => plan_file::to_csv(&given_poses(run)?, period_s),
     };
-    let text = TextReader::of_reader(csv.as_bytes(), Path::new("run")).map_err(internal)?;
+    let text = TextReader::from_reader(csv.as_bytes(), Path::new("run")).map_err(internal)?;
     let trajectory = plan_file::of_text(text, period_s).map_err(|error| wrong("run", error))?;
     Ok(Run::planned(trajectory))
 }

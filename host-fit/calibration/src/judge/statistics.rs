@@ -1,7 +1,7 @@
 //! Errors of decoded poses against the reference: rms and peak by axis, and their noise.
 
 use hallstage_input::dataset::Movement;
-use hallstage_input::statistics::SecondDifferences;
+use hallstage_solver::statistics::SecondDifferences;
 
 /// rms and peak of one axis, m or rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

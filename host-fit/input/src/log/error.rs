@@ -118,9 +118,6 @@ pub enum LogProblem {
         /// The most.
         limit: usize,
     },
-    /// The log has other rows than when it was read first.
-    #[error("the log changed while it was read: it is read twice; wait until it is recorded")]
-    Changed,
     /// A line without an end.
     #[error(
         "the line is longer than {limit_bytes} bytes, the most that is read; name a log with a row in each line"

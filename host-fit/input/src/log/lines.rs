@@ -174,7 +174,7 @@ mod tests {
     fn lines_have_their_numbers_across_pieces_whatever_ends_them() {
         for end in ["\n", "\r\n", "\r"] {
             let text: String = (1..=90_000).map(|k| format!("{k}{end}")).collect();
-            let reader = TextReader::of_reader(text.as_bytes(), Path::new("x")).expect("text");
+            let reader = TextReader::from_reader(text.as_bytes(), Path::new("x")).expect("text");
             let mut lines = Lines::new(reader);
             let opening = lines.opening().expect("text").to_vec();
             assert!(text.as_bytes().starts_with(&opening));

@@ -165,14 +165,3 @@ fn a_log_named_twice_is_refused_whatever_its_length() {
         assert_eq!(refused.place.path, paths[1]);
     }
 }
-
-#[test]
-fn a_log_in_memory_is_read_again_whole_and_anew_in_another_way() {
-    let sample = read_bytes(LOG_GZ, Path::new("log"), &stage(), &options(5_000)).expect("sound");
-    assert!(sample.dataset.rows.len() <= 5_000);
-    let mut rows = 0;
-    let again = sample.each_row(&stage(), |_, _| rows += 1);
-    assert!(again.is_ok() && rows == sample.dataset.read().0);
-    let whole = sample.read_anew(&stage(), &ReadOptions::default(), |_, _| ());
-    assert_eq!(whole.expect("sound").dataset.rows.len(), rows);
-}

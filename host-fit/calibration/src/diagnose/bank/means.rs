@@ -5,10 +5,11 @@ use super::{MEANS_MAX, RARITY};
 use crate::diagnose::signals::CLEAR;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_input::statistics::{median, white_noise};
+use hallstage_input::statistics::median;
 use hallstage_solver::solve::field::blocks::Rows;
 use hallstage_solver::solve::field::probe::Probe;
 use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::statistics::white_noise;
 use std::ops::Range;
 
 /// Each so many rows of a movement have a noise of their own, known within a tenth.

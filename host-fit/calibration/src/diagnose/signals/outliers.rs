@@ -5,7 +5,7 @@ use super::residual::{Residuals, is_seen};
 use super::{BLOCK, CLEAR};
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Finding, Kind};
-use hallstage_input::statistics::robust_deviation;
+use hallstage_solver::statistics::robust_deviation;
 use rayon::prelude::*;
 
 /// Names rows far outside the noise, by channel, and leaves them out.

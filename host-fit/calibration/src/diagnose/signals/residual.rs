@@ -2,10 +2,10 @@
 
 use super::channels::{LogSignals, median};
 use crate::diagnose::slopes::Slopes;
-use hallstage_input::statistics::{robust_deviation, white_noise};
 use hallstage_solver::solve::field::blocks::Rows;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::probe::probes;
+use hallstage_solver::statistics::{robust_deviation, white_noise};
 use nalgebra::Vector3;
 
 /// A channel shows an error that the residuals ask of it if it moves by this part of it to its inverse; and of

@@ -5,8 +5,8 @@ use super::probe::Probe;
 use super::terms::{COUNT, PER_PROBE};
 use super::whiten::{Noise, UNKNOWNS};
 use crate::solve::robust::HALF;
+use crate::statistics::SecondDifferences;
 use hallstage_input::stage::Stage;
-use hallstage_input::statistics::SecondDifferences;
 use nalgebra::DMatrix;
 use runtime::matrix::{from_rows, inverse, to_rows};
 
