@@ -6,16 +6,18 @@
 //!
 //! let blob = std::fs::read("../runtime/examples/field.bin")?;
 //! let set = ParameterSet::from_flash(&blob)?;
-//! let same = pose_difference(&set, &set);
+//! let same = serde_json::to_value(pose_difference(&set, &set))?;
 //! assert_eq!((&same["poses"], &same["axes"]["rz"]["peak_urad"]), (&15_625.into(), &0.0.into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
+use crate::report::figure::{Group, bare, group, micro};
+use crate::report::parameters::{parameters_in, temperature_parameters_in};
+use hallstage_input::axis::{AXES, Axis};
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::from_rows;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use std::array::from_fn;
 use std::collections::BTreeMap;
 
@@ -23,64 +25,53 @@ use std::collections::BTreeMap;
 const LEVELS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Steps towards the codes of a pose: each leaves a tenth of the way or less.
 const STEPS: u32 = 6;
-/// Axes of a pose with the units of their errors.
-const AXES: [(&str, &str); 6] = [
-    ("x", "um"),
-    ("y", "um"),
-    ("rz", "urad"),
-    ("z", "um"),
-    ("rx", "urad"),
-    ("ry", "urad"),
-];
-
-/// The parameters of both blobs by name, with k and h of the temperatures, SI: their values `a` and `b`, null where the model has no such
-/// term; the change, and `sigma`, the change over the standard error of a difference of independent logs,
-/// null unless both `errors` (SI, by name) are known.
-pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Value {
+/// The parameters of both blobs by name, with k and h of the temperatures, SI: values `a` and `b`, null where the model has
+/// no such term; the change; and `sigma`, the change over the standard error of a difference between independent logs, null
+/// unless both `errors` (SI, by name) are known.
+pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Group {
     let [in_a, in_b] = sets.map(|set| {
         let mut all = parameters_in(set);
         all.extend(temperature_parameters_in(set));
         all
     });
-    let change = |(name, Parameter { unit, .. }): (&String, &Parameter)| {
-        let value = |of: &BTreeMap<String, Parameter>| of.get(name).map(|p| p.value);
-        let (a, b) = (value(&in_a), value(&in_b));
+    let mut names: Vec<&String> = in_a.keys().collect();
+    names.extend(in_b.keys().filter(|name| !in_a.contains_key(*name)));
+    let change = |name: &String| {
+        let [a, b] = [&in_a, &in_b].map(|all| all.get(name));
+        let unit = a.or(b).map_or("", |parameter| parameter.unit);
+        let [a, b] = [a, b].map(|parameter| parameter.map(|parameter| parameter.value));
         let change = a.zip(b).map(|(a, b)| b - a);
-        let deviations = errors[0].get(name).zip(errors[1].get(name));
+        let errors = errors[0].get(name).zip(errors[1].get(name));
         let sigma = change
-            .zip(deviations)
-            .map(|(change, (a, b))| change / (a * a + b * b).sqrt());
-        let figures = json!({ "a": a, "b": b, "change": change, "sigma": sigma, "unit": unit });
-        (name.clone(), figures)
+            .zip(errors)
+            .map(|(change, (a, b))| change / a.hypot(*b));
+        let si = |x: Option<f64>| x.map(|x| bare(x, unit));
+        let figures = group! {
+            "a" => si(a), "b" => si(b), "change" => si(change), "sigma" => sigma, "unit" => json!(unit),
+        };
+        (name.clone(), figures.into())
     };
-    in_a.iter()
-        .chain(&in_b)
-        .map(change)
-        .collect::<Map<_, _>>()
-        .into()
+    Group(names.into_iter().map(change).collect())
 }
 
-/// The second blob's pose less the first one's, by the decoder that runs on the target, over the codes of
-/// a grid of poses: those at which the first blob reads nearly the poses. Its range is that for which both
-/// are calibrated; `refused` counts poses that one of them does not decode. Null where the geometry of the
-/// first blob cannot be inverted.
-pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Value {
+/// The second blob's pose less the first one's, by the decoder of the target, over the codes of a grid of poses: the codes
+/// at which the first blob reads nearly these poses. Its range is the one for which both are calibrated; `refused` counts
+/// poses that one of them does not decode. `None` where the geometry of the first blob cannot be inverted.
+pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
     let range_of = |set: &ParameterSet| {
         let c = &set.constants;
         [c.calibrated_planar, c.calibrated_vertical].concat()
     };
     let (of_a, of_b) = (range_of(a), range_of(b));
-    let range: [f64; 6] = from_fn(|k| f64::from(of_a[k].min(of_b[k])));
-    let Some(codes) = Codes::new(a) else {
-        return Value::Null;
-    };
+    let range_si: [f64; 6] = from_fn(|k| f64::from(of_a[k].min(of_b[k])));
+    let codes = Codes::new(a)?;
     let decoders = [a.decoder(), b.decoder()];
     // By axis: sum, sum of squares, largest magnitude.
     let mut sums = [[0.0f64; 3]; 6];
     let (mut poses, mut refused) = (0u32, 0u32);
     for place in 0..LEVELS.len().pow(6) {
         let level = |axis: usize| LEVELS[place / LEVELS.len().pow(axis as u32) % LEVELS.len()];
-        let frame = codes.at(from_fn(|axis| level(axis) * range[axis]));
+        let frame = codes.at(from_fn(|axis| level(axis) * range_si[axis]));
         let read = |decoder: &runtime::AnyDecoder| {
             let reading = decoder.decode(&frame, &PlanarPose::ZERO);
             let planar = reading.planar()?.to_array();
@@ -99,22 +90,19 @@ pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Value {
         }
     }
     let n = f64::from(poses.max(1));
-    let axis = |(k, (name, unit)): (usize, &(&str, &str))| {
-        let [sum, squares, peak] = sums[k];
-        let figures = json!({
-            format!("mean_{unit}"): sum / n * 1e6,
-            format!("rms_{unit}"): (squares / n).sqrt() * 1e6,
-            format!("peak_{unit}"): peak * 1e6,
-        });
-        ((*name).to_owned(), figures)
+    let difference = |(axis, [sum, squares, peak]): (&Axis, [f64; 3])| {
+        let micro = |x: f64| micro(axis, x);
+        let figures = group! {
+            "mean" => micro(sum / n), "rms" => micro((squares / n).sqrt()), "peak" => micro(peak),
+        };
+        (axis.key.to_owned(), figures.into())
     };
-    let ranges = AXES.iter().zip(range);
-    let ranges = ranges.map(|((name, unit), x)| (format!("{name}_{unit}"), json!(x * 1e6)));
-    json!({
-        "poses": poses,
-        "refused": refused,
-        "range": ranges.collect::<Map<_, _>>(),
-        "axes": AXES.iter().enumerate().map(axis).collect::<Map<_, _>>(),
+    let range = |(axis, end): (&Axis, f64)| (axis.key.to_owned(), micro(axis, end).into());
+    Some(group! {
+        "poses" => poses,
+        "refused" => refused,
+        "range" => Group(AXES.iter().zip(range_si).map(range).collect()),
+        "axes" => Group(AXES.iter().zip(sums).map(difference).collect()),
     })
 }
 
@@ -191,8 +179,13 @@ mod tests {
             for row in &mut b.constants.planar_per_code {
                 row.iter_mut().for_each(|x| *x *= 1.001);
             }
-            let found = pose_difference(&a, &b);
-            for (name, unit) in AXES {
+            let found = serde_json::to_value(pose_difference(&a, &b)).expect("JSON");
+            for Axis {
+                key: name,
+                micro: unit,
+                ..
+            } in AXES
+            {
                 let figure = |what: &str| {
                     let figure = &found["axes"][name][format!("{what}_{unit}")];
                     figure.as_f64().expect("a figure")

@@ -18,8 +18,8 @@ use host_fit::calibration::recalibrate::Known;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
-use host_fit::report::json::Report;
-use host_fit::report::page::Errors;
+use host_fit::report::errors::{errors, from_rms_and_peak};
+use host_fit::report::result::Report;
 use host_fit::solver::problem::model::Model;
 use host_fit::solver::solve::field::update::Change;
 use pyo3::exceptions::PyValueError;
@@ -238,8 +238,8 @@ impl Calibration {
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [rms, peak] = [self.set.fit.rms, self.set.fit.peak].map(|of| of.map(f64::from));
         match &self.origin {
-            Origin::Fit(of) => finding::figures(py, &of.report.errors),
-            _ => finding::figures(py, &host_fit::report::errors::of(rms, peak)),
+            Origin::Fit(of) => finding::figures(py, &errors(&of.report.errors)),
+            _ => finding::figures(py, &from_rms_and_peak(rms, peak)),
         }
     }
 
@@ -332,7 +332,7 @@ impl Calibration {
         operator: Option<&str>,
         notes: Option<BTreeMap<String, String>>,
     ) -> PyResult<()> {
-        let (of, fit) = self.fit_or_raise("report")?;
+        let (of, _) = self.fit_or_raise("report")?;
         let about = About {
             title: "Calibration certificate",
             serial: &self.set.serial,
@@ -352,7 +352,7 @@ impl Calibration {
                 stage_file,
                 of.outcome.subject(),
                 (warnings_of(log), &blob),
-                Errors::of_fit(fit, fit.rows(&log.dataset), report),
+                report,
             )
         })
     }

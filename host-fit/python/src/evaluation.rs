@@ -11,7 +11,8 @@ use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated};
 use host_fit::calibration::judge::Zeros;
 use host_fit::calibration::recalibrate::Known;
 use host_fit::input::stage::Stage as Designed;
-use host_fit::report::json::Report;
+use host_fit::report::errors::errors;
+use host_fit::report::result::Report;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use runtime::ParameterSet;
@@ -77,7 +78,7 @@ impl Evaluation {
     /// rms and peak of X, Y, Rz over all rows: um, um, urad.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        finding::figures(py, &self.report.errors)
+        finding::figures(py, &errors(&self.report.errors))
     }
 
     /// What is wrong with the logs, the most severe first.
@@ -135,7 +136,7 @@ impl Evaluation {
                 stage_file,
                 of.subject(),
                 (self.report.warnings.clone(), &self.blob),
-                of.errors(&self.report),
+                &self.report,
             )
         })
     }

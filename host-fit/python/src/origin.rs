@@ -4,7 +4,7 @@ use host_fit::calibrate::{Outcome, Updated};
 use host_fit::calibration::diagnose::Diagnosis;
 use host_fit::calibration::fit::Fit;
 use host_fit::input::log::LogReading;
-use host_fit::report::json::Report;
+use host_fit::report::result::Report;
 use host_fit::report::verdict::Subject;
 use std::sync::Arc;
 

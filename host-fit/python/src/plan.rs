@@ -13,7 +13,7 @@ use host_fit::input::stage::Stage as Designed;
 use host_fit::input::text::TextReader;
 use host_fit::output::write_atomically;
 use host_fit::report::plan::{figures, tables};
-use host_fit::report::table::as_text;
+use host_fit::report::text::as_text;
 use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::plan_file;
 use host_fit::simulate::pose::StagePose;
@@ -57,8 +57,7 @@ impl Plan {
     /// JSON of `host-fit plan` as a dict.
     #[getter]
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = figures(&self.plan, &[], &self.designed).to_string();
-        py.import("json")?.call_method1("loads", (text,))
+        crate::finding::figures(py, &figures(&self.plan, &[], &self.designed))
     }
 
     /// Writes the trajectory: columns t_us, x_um, y_um, rz_urad, z_um, rx_urad, ry_urad, a row for each servo
@@ -68,7 +67,7 @@ impl Plan {
     }
 
     fn __repr__(&self) -> String {
-        as_text(&tables(&figures(&self.plan, &[], &self.designed)))
+        as_text(&tables(&self.plan, &[], &self.designed))
     }
 }
 

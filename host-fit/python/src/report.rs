@@ -11,8 +11,9 @@ use host_fit::output::write_atomically;
 use host_fit::report::Density;
 use host_fit::report::errors::RowErrors;
 use host_fit::report::html::{Cause, Page};
-use host_fit::report::page::{Errors, Source, facts};
+use host_fit::report::page::{Source, facts};
 use host_fit::report::provenance::Provenance;
+use host_fit::report::result::Report;
 use host_fit::report::verdict::{Subject, Summary};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -87,7 +88,7 @@ pub fn write(
     stage_file: Option<&PathBuf>,
     subject: Subject,
     (warnings, blob): (Vec<String>, &[u8]),
-    errors: Errors,
+    report: &Report,
 ) -> PyResult<()> {
     let mut provenance = Provenance::new(about.call.into_iter());
     provenance.add_logs(&log.dataset);
@@ -104,7 +105,7 @@ pub fn write(
         dataset: &log.dataset,
         provenance,
         warnings,
-        errors: Some(errors),
+        report: Some(report),
     };
     let html = source.html().map_err(internal)?;
     if path.is_dir() {

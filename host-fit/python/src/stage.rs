@@ -1,9 +1,11 @@
 //! The stage as designed.
 
 use crate::error::{of_stage, wrong};
-use host_fit::input::axis::AXES;
+use host_fit::input::axis::{AXES, PROBES};
 use host_fit::input::stage::Stage as Designed;
-use host_fit::report::table::{Table, as_text, number};
+use host_fit::report::figure::{Figure, bare, micro};
+use host_fit::report::table::Table;
+use host_fit::report::text::as_text;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBool, PyDict};
 use std::path::{Path, PathBuf};
@@ -119,29 +121,24 @@ impl Stage {
 impl Stage {
     fn tables(&self) -> Vec<Table> {
         let stage = &*self.designed;
+        let mm = |m: f64| bare(m * 1e3, "mm");
         let mut sensors = Table::new("stage", &["x, mm", "y, mm", "um per code", "codes"]);
-        let places = stage.places_m().into_iter().zip(["A", "B", "C"]);
+        let places = stage.places_m().into_iter().zip(PROBES);
         let hall = places.map(|(place, name)| (format!("Hall probe {name}"), place, &stage.hall));
         let places = stage.capacitive_probes_m.into_iter().zip(1..);
         let gaps = places.map(|(place, k)| (format!("gap {k}"), place, &stage.capacitive));
-        for (name, place, scale) in hall.chain(gaps) {
-            let [x, y] = place.map(|x| number(x * 1e3, ""));
+        for (name, [x, y], scale) in hall.chain(gaps) {
             let window = format!("{} to {}", scale.window.low, scale.window.high);
-            let cells = [x, y, number(scale.m_per_count * 1e6, ""), window];
-            sensors.row(name, cells);
+            let numbers = [x * 1e3, y * 1e3, scale.m_per_count * 1e6].map(Figure::from);
+            sensors.row(name, numbers.into_iter().chain([window.into()]));
         }
-        let mut motion = Table::new("in service", &["to either side", "unit"]);
+        let mut motion = Table::new("in service", &["to either side"]);
         for (axis, moves) in AXES.iter().zip(&stage.motion.axes) {
-            let cells = [number(moves.service * 1e6, ""), axis.micro.to_owned()];
-            motion.row(axis.key, cells);
+            motion.row(axis.key, [micro(axis, moves.service)]);
         }
         let mut others = Table::default();
-        others.row(
-            "Y beams apart",
-            [format!("{} mm", number(stage.y_baseline_m * 1e3, ""))],
-        );
-        let period = number(stage.servo_period_s * 1e3, "");
-        others.row("servo period", [format!("{period} ms")]);
+        others.row("Y beams apart", [mm(stage.y_baseline_m)]);
+        others.row("servo period", [bare(stage.servo_period_s * 1e3, "ms")]);
         vec![sensors, motion, others]
     }
 }

@@ -3,8 +3,8 @@
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::Known;
 use host_fit::diff::{parameter_changes, pose_difference};
-use host_fit::report::json::Report;
 use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
+use host_fit::report::result::Report;
 use host_fit::solver::solve::field::terms;
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods};

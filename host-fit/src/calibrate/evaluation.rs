@@ -2,8 +2,7 @@
 
 use super::warnings_of;
 use crate::report::errors::RowErrors;
-use crate::report::json::{Circumstances, Report, of_eval};
-use crate::report::page::Errors;
+use crate::report::result::{Circumstances, Judged, Report};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use hallstage_calibration::fit::counted;
@@ -122,13 +121,14 @@ impl Evaluation {
             warnings,
             ..Circumstances::new(&self.log, &self.stage, elapsed_s, self.diagnosis.clone())
         };
-        of_eval(
-            &self.set,
-            &self.judgement,
-            self.zeros,
-            &self.by_row,
-            &circumstances,
-        )
+        let judged = Judged {
+            set: &self.set,
+            judgement: &self.judgement,
+            zeros: self.zeros,
+            by_row: &self.by_row,
+            over_rows: self.of_rows.errors,
+        };
+        Report::from_judgement(judged, &circumstances)
     }
 
     /// How it ended, for reports.
@@ -142,18 +142,6 @@ impl Evaluation {
             errors: Some(&self.judgement.errors),
             limits: own.map(|rms| (rms > 0.0).then_some(self.limit * rms)),
             in_service: false,
-        }
-    }
-
-    /// What a page shows of the errors.
-    pub fn errors<'e>(&'e self, report: &'e Report) -> Errors<'e> {
-        Errors {
-            set: &self.set,
-            by_row: self.by_row.clone(),
-            figures: &self.of_rows.errors,
-            movements: &report.zero_deviations,
-            parameters: &report.parameters,
-            details: report.details(&["trusted_inputs", "errors"]),
         }
     }
 

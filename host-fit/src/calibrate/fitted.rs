@@ -1,7 +1,7 @@
 //! A fit with the decisions around it.
 
 use super::{Limits, failure};
-use crate::report::json::{Choice, Circumstances, Report, of_fit};
+use crate::report::result::{Choice, Circumstances, Report};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::of_fit as of_residuals;
 use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
@@ -199,7 +199,7 @@ impl Outcome {
             dataset: fit.rows(&log.dataset),
             ..Circumstances::new(log, stage, elapsed_s, diagnosis)
         };
-        Some(of_fit(fit, choice, &circumstances))
+        Some(Report::from_fit(fit, &choice, &circumstances))
     }
 }
 

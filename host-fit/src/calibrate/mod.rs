@@ -17,6 +17,7 @@ pub use recalibration::Updated;
 pub use settings::{Mismatch, loss_of};
 
 use crate::report::errors::errors;
+use crate::report::figure::{Group, group};
 use crate::report::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::fit::{Fit, FitError};
@@ -26,7 +27,7 @@ use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// What comes before the cause of a fit that failed.
 pub const NOT_WRITTEN: &str = "the fit failed its own checks, and no parameter blob was written: ";
@@ -94,23 +95,23 @@ pub fn other_scales(set: &ParameterSet, stage: &Stage) -> Option<String> {
     })
 }
 
-/// What is said of a log of which no calibration is kept: model and errors of the fit over all rows, null
-/// without a fit; why there is no fit, null if there is one.
-pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Diagnosis) -> Value {
+/// The figures of a log that no calibration is kept of: model and errors of the fit, null without a fit; why there is no
+/// fit, null if there is one.
+pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Diagnosis) -> Group {
     let (rows, movements) = log.dataset.read();
     let fit = fitted.ok();
-    json!({
-        "rows": rows,
-        "judged_rows": fit.map(|fit| fit.judgement.rows()),
-        "movements": movements,
-        "skipped_rows": log.skipped_rows,
-        "model": fit.map(|fit| fit.model.name),
-        "errors": fit.map(|fit| errors(&fit.judgement.errors)),
-        "failure": fitted.err().map(ToString::to_string),
-        "warnings": warnings_of(log),
-        "verdict": diagnosis.verdict,
-        "predicted": diagnosis.predicted,
-        "findings": words::worded(&diagnosis.findings),
-        "trusted_inputs": fit.map_or_else(|| json!([]), |fit| trusted(&fit.set)),
-    })
+    group! {
+        "rows" => rows,
+        "judged_rows" => fit.map(|fit| fit.judgement.rows()),
+        "movements" => movements,
+        "skipped_rows" => log.skipped_rows,
+        "model" => fit.map(|fit| fit.model.name),
+        "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
+        "failure" => json!(fitted.err().map(ToString::to_string)),
+        "warnings" => json!(warnings_of(log)),
+        "verdict" => json!(diagnosis.verdict),
+        "predicted" => json!(diagnosis.predicted),
+        "findings" => json!(words::worded(&diagnosis.findings)),
+        "trusted_inputs" => fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
+    }
 }

@@ -1,8 +1,8 @@
 //! What is said of a calibration that was brought up to date.
 
 use super::warnings_of;
-use crate::report::errors::errors;
-use crate::report::field::by_axis;
+use crate::report::errors::{errors, pose};
+use crate::report::figure::{Group, figure, group};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::fit::codes_refused;
 use hallstage_calibration::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
@@ -13,7 +13,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::update::Change;
 use runtime::ParameterSet;
 use runtime::parameters::Text;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// A calibration that was brought up to date, and what is said of it.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub struct Updated {
     /// What the user should know of it.
     pub warnings: Vec<String>,
     /// The figures.
-    pub figures: Value,
+    pub figures: Group,
     /// Why it is no good, where the log says so.
     pub refusal: Option<String>,
 }
@@ -78,32 +78,32 @@ fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
     warnings
 }
 
-fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Value {
-    let gain = |(change, error): (f64, f64)| json!({ "change_percent": change * 100.0, "standard_error_percent": error * 100.0 });
+fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Group {
+    let gain = |(change, error): (f64, f64)| group! { "change" => figure(change * 100.0, "%").with_error(Some(error * 100.0)) };
     let [a, b, c] = new.gains.map(gain);
     // rms errors, from ratios to the noise floor.
-    let rms = |ratios: [f64; 3]| by_axis([0, 1, 2].map(|k| new.floor[k] * ratios[k]));
-    json!({
-        "what": change.name(),
-        "rows": log.dataset.rows.len(),
-        "movements": log.dataset.movements.len(),
-        "gains": { "a": a, "b": b, "c": c },
-        // What is predicted for service over the calibrated range: with the old blob, with the new one,
-        // and by the noise of the probes alone.
-        "predicted_service": {
-            "before": rms(new.before), "after": rms(new.after), "floor": rms([1.0; 3]),
+    let rms = |ratios: [f64; 3]| pose([0, 1, 2].map(|k| new.floor[k] * ratios[k]));
+    group! {
+        "what" => change.name(),
+        "rows" => log.dataset.rows.len(),
+        "movements" => log.dataset.movements.len(),
+        "gains" => group! { "a" => a, "b" => b, "c" => c },
+        // Predicted for service over the calibrated range: with the old blob, with the new one, and from the noise of the
+        // probes alone.
+        "predicted_service" => group! {
+            "before" => rms(new.before), "after" => rms(new.after), "floor" => rms([1.0; 3]),
         },
         // Whether an old posterior was there, and a new one is.
-        "posterior": new.known.is_some(),
+        "posterior" => new.known.is_some(),
         // Over residuals: about 1.
-        "chi_squared": new.chi_squared,
+        "chi_squared" => new.chi_squared,
         // Over the log, zero deviations refitted.
-        "errors": errors(&new.judgement.errors),
-        "errors_before": errors(&new.judgement_before.errors),
-        "serial": new.set.serial.as_str(),
-        "warnings": warnings,
-        "verdict": new.diagnosis.verdict,
-        "predicted": new.diagnosis.predicted,
-        "findings": words::worded(&new.diagnosis.findings),
-    })
+        "errors" => errors(&new.judgement.errors),
+        "errors_before" => errors(&new.judgement_before.errors),
+        "serial" => new.set.serial.as_str(),
+        "warnings" => json!(warnings),
+        "verdict" => json!(new.diagnosis.verdict),
+        "predicted" => json!(new.diagnosis.predicted),
+        "findings" => json!(words::worded(&new.diagnosis.findings)),
+    }
 }

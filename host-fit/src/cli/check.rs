@@ -7,9 +7,7 @@ use crate::calibrate::{check_refusal, checked, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::report::json::{Circumstances, of_eval};
-use crate::report::page::Errors;
-use crate::report::table::tables;
+use crate::report::result::{self, Circumstances, Judged};
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
@@ -75,30 +73,28 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         ..Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default())
     };
     let judged = fit.map(|fit| {
-        let zeros = Zeros::of_model(fit.model);
         let by_row = (fit.decoded).errors_less(&fit.judgement.zeros, circumstances.dataset);
-        of_eval(&fit.set, &fit.judgement, zeros, &by_row, &circumstances)
+        let judged = Judged {
+            set: &fit.set,
+            judgement: &fit.judgement,
+            zeros: Zeros::of_model(fit.model),
+            by_row: &by_row,
+            over_rows: fit.judgement.errors,
+        };
+        result::Report::from_judgement(judged, &circumstances)
     });
     args.report.add(&mut outputs, || {
         let what = ("Check of a log", "");
         let mut source = args
             .report
             .source(what, &args.logs, (&log, &stage), subject);
-        source.errors = fit
-            .zip(judged.as_ref())
-            .map(|(fit, judged)| Errors::of_fit(fit, circumstances.dataset, judged));
+        source.report = judged.as_ref();
         Ok(source)
     })?;
-    let hidden = ["failure", "warnings", "verdict", "predicted", "findings"];
     let is_note = |found: &Finding| found.severity == Severity::Note;
     if why.is_none() && findings.iter().all(is_note) {
         terminal::print("no fault found\n")?;
     }
-    finish(
-        outputs,
-        &tables(&checked, &hidden),
-        &warnings_of(&log),
-        &subject,
-    )?;
+    finish(outputs, &checked.tables(), &warnings_of(&log), &subject)?;
     why.map_or(Ok(()), |why| Err(HostError::rejected(why)))
 }

@@ -5,9 +5,9 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::pose_file::{DecodeSettings, PoseFormat, decode_log};
 use crate::output::{self, Output, Outputs, posterior_file};
-use crate::report::errors::{self, error_table, micro};
+use crate::report::errors::{self, error_table, to_micro};
 use crate::report::parameters::{self, parameters};
-use crate::report::table::as_text;
+use crate::report::text::as_text;
 use clap::Args;
 use hallstage_calibration::fit::{Fit, FitError, FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::precision::largest_difference;
@@ -146,7 +146,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         decoded.judge(dataset, &stage, zeros).errors
     };
     let designed = errors::designed(&heights, &stage);
-    let designed = designed.map_or([[f64::NAN; 2]; 3], |(_, errors)| micro(&errors));
+    let designed = designed.map_or([[f64::NAN; 2]; 3], |(_, errors)| to_micro(&errors));
     let model_30 = fitted(&heights, ModelKind::M30)?;
     let model_31 = fitted(&paper, ModelKind::M31)?;
     let model_31_of_run = fitted(&run, ModelKind::M31)?;
@@ -168,7 +168,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let poses = Output::create(&files[5])?;
     decode_log::<HostError>(&files[0], &stage, &decoding, poses)?;
 
-    let in_service = |fit: &Fit| micro(&judged(&fit.set, &service, Zeros::None));
+    let in_service = |fit: &Fit| to_micro(&judged(&fit.set, &service, Zeros::None));
     let paper_s = "  the paper's";
     let errors = error_table(
         "Errors, rms and peak",
@@ -180,16 +180,16 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
             (paper_s, TABLE_2),
             (
                 "Table 4: Model (30) fitted to the same movements",
-                micro(&model_30.judgement.errors),
+                to_micro(&model_30.judgement.errors),
             ),
             (paper_s, TABLE_4),
             (
                 "the same at all 19 vertical settings",
-                micro(&judged(&model_30.set, &paper, Zeros::Refit)),
+                to_micro(&judged(&model_30.set, &paper, Zeros::Refit)),
             ),
             (
                 "Table 8: Model (31) fitted to all rows",
-                micro(&model_31.judgement.errors),
+                to_micro(&model_31.judgement.errors),
             ),
             (paper_s, TABLE_8),
             (

@@ -7,12 +7,12 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diff::{parameter_changes, pose_difference};
 use crate::output::{blob_file, posterior_file};
-use crate::report::table::{as_text, tables};
+use crate::report::figure::{Group, group};
+use crate::report::text::as_text;
 use clap::Args;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::field::terms::names;
 use runtime::{ModelKind, ParameterSet};
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -38,15 +38,17 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
         standard_errors(&a, paths[0])?,
         standard_errors(&b, paths[1])?,
     ];
-    let figures = json!({
-        "a": blob(paths[0], &a),
-        "b": blob(paths[1], &b),
-        "same_logs": a.logs_sha256 == b.logs_sha256,
-        "parameters": parameter_changes([&a, &b], [&errors[0], &errors[1]]),
-        "pose_difference": pose_difference(&a, &b),
-    });
+    let difference = pose_difference(&a, &b);
+    let is_compared = difference.is_some();
+    let figures = group! {
+        "a" => blob(paths[0], &a),
+        "b" => blob(paths[1], &b),
+        "same_logs" => a.logs_sha256 == b.logs_sha256,
+        "parameters" => parameter_changes([&a, &b], [&errors[0], &errors[1]]),
+        "pose_difference" => difference,
+    };
     args.json.write(&figures)?;
-    terminal::print(&as_text(&tables(&figures, &[])))?;
+    terminal::print(&as_text(&figures.tables()))?;
     if a.serial != b.serial {
         let [a, b] = [&a, &b].map(|set| match set.serial.as_str() {
             "" => "none".to_owned(),
@@ -54,7 +56,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
         });
         terminal::warn(&[format!("the blobs have other serial numbers: {a} and {b}")]);
     }
-    if figures["pose_difference"].is_null() {
+    if !is_compared {
         terminal::warn(&[
             "the poses cannot be compared: the geometry of the first blob has no inverse"
                 .to_owned(),
@@ -64,16 +66,16 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
 }
 
 /// What a blob says of itself.
-fn blob(path: &Path, set: &ParameterSet) -> Value {
-    json!({
-        "file": path.display().to_string(),
-        "model": Model::of(set.model).name,
-        "serial": set.serial.as_str(),
-        "created": set.created.as_str(),
-        "rows": set.fit.rows,
-        "train_rows": set.fit.train_rows,
-        "errors": errors(set.fit.rms, set.fit.peak),
-    })
+fn blob(path: &Path, set: &ParameterSet) -> Group {
+    group! {
+        "file" => path.display().to_string(),
+        "model" => Model::of(set.model).name,
+        "serial" => set.serial.as_str(),
+        "created" => set.created.as_str(),
+        "rows" => set.fit.rows,
+        "train_rows" => set.fit.train_rows,
+        "errors" => errors(set.fit.rms, set.fit.peak),
+    }
 }
 
 /// The standard errors in the posterior beside a blob; none where there is no such file.

@@ -75,11 +75,15 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         let provenance = &mut source.provenance;
         provenance.add_bytes(&args.params, &blob, "parameter blob, judged");
         source.warnings.clone_from(&report.warnings);
-        source.errors = Some(evaluation.errors(&report));
+        source.report = Some(&report);
         Ok(source)
     })?;
-    let details = report.details(&["trusted_inputs"]);
-    finish(outputs, &details, &report.warnings, &subject)?;
+    finish(
+        outputs,
+        &report.figures.tables(),
+        &report.warnings,
+        &subject,
+    )?;
     match evaluation.refusal() {
         Some(why) => Err(HostError::rejected(why)),
         None => Ok(()),

@@ -8,9 +8,9 @@ use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
-use crate::report::json::Report;
-use crate::report::page::{Errors, Source};
+use crate::report::page::Source;
 use crate::report::parameters;
+use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
@@ -143,7 +143,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let known = outcome.known();
     posterior_file::add_calibration(&mut outputs, &args.out, &fit.set, known.as_ref())?;
     let designed = [("designed", parameters::designed(&stage))];
-    let mut details = report.details(&[]);
+    let mut details = report.figures.tables();
     details.splice(1..1, parameters::tables(&report.parameters, &designed));
     finish(outputs, &details, &warnings, &subject)?;
     match interrupt::is_requested() {
@@ -199,6 +199,6 @@ fn source<'a>(
         let provenance = &mut source.provenance;
         provenance.add_bytes(&args.out, &blob, "parameter blob, written");
     }
-    source.errors = fit.map(|(fit, report)| Errors::of_fit(fit, fit.rows(&log.dataset), report));
+    source.report = fit.map(|(_, report)| report);
     Ok(source)
 }

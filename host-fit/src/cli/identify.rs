@@ -7,10 +7,11 @@ use crate::bus::BusAddress;
 use crate::bus::update::{self, Identity};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::report::table::{as_text, tables};
+use crate::report::figure::{Group, group};
+use crate::report::text::as_text;
 use clap::Args;
 use hal_adapters::can::update::BlobId;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
@@ -27,33 +28,32 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], &Report::default(), [])?;
     let figures = figures(&update::identify(&args.can, interrupt::watch())?);
     args.json.write(&figures)?;
-    terminal::print(&as_text(&tables(&figures, &["next", "newest_sequence"])))
+    terminal::print(&as_text(&figures.tables()))
 }
 
-fn figures(identity: &Identity) -> Value {
-    let blob = |id: BlobId| json!({ "sequence": id.sequence, "crc32c": format!("{:08x}", id.crc) });
+fn figures(identity: &Identity) -> Group {
+    let blob =
+        |id: BlobId| group! { "sequence" => id.sequence, "crc32c" => format!("{:08x}", id.crc) };
     let running = identity.running.map(|(id, bytes)| {
-        json!({
-            "sequence": id.sequence,
-            "crc32c": format!("{:08x}", id.crc),
-            "bytes": bytes,
-        })
+        let mut running = blob(id);
+        running.set("bytes", bytes);
+        running
     });
     let runs = |id: &BlobId| identity.running.is_some_and(|(running, _)| running == *id);
     let newest = identity.newest_sequence;
     let is_unused = newest > identity.next.map_or(0, |next| next.sequence);
-    json!({
-        "serial": identity.serial,
-        "running": running,
-        "newest_sequence": newest,
-        "next": identity.next.map(blob),
+    group! {
+        "serial" => identity.serial.as_str(),
+        "running" => running,
+        "newest_sequence" => json!(newest),
+        "next" => json!(identity.next.map(blob)),
         // Stored, and in force after an activation or power-on.
-        "waiting": identity.next.filter(|next| !runs(next)).map(blob),
+        "waiting" => identity.next.filter(|next| !runs(next)).map(blob),
         // Damaged, or of another stage.
-        "not_used": is_unused.then(|| json!({ "sequence": newest })),
-        "program_version": identity.program_version.map(|part| part.to_string()).join("."),
-        "needs_key": identity.needs_key,
-    })
+        "not_used" => is_unused.then(|| group! { "sequence" => newest }),
+        "program_version" => identity.program_version.map(|part| part.to_string()).join("."),
+        "needs_key" => identity.needs_key,
+    }
 }
 
 /// The parameters that run, in one line.
@@ -77,14 +77,14 @@ mod tests {
             (3, 4, false, true),
             (4, 5, true, true),
         ] {
-            let shown = figures(&Identity {
+            let shown = json!(figures(&Identity {
                 serial: "HS-0007".to_owned(),
                 running: Some((blob(3), 500)),
                 newest_sequence,
                 next: Some(blob(next)),
                 program_version: [0; 3],
                 needs_key: true,
-            });
+            }));
             assert_eq!(shown["waiting"].is_object(), waits, "{shown}");
             assert_eq!(shown["not_used"].is_object(), is_unused, "{shown}");
         }

@@ -4,10 +4,11 @@ use super::arguments::{between, choice};
 use super::interrupt;
 use super::report::Report;
 use crate::bus::BusAddress;
-use crate::bus::import::{self, ImportSettings};
+use crate::bus::import::{self, ImportReport, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::report::table::{as_text, tables};
+use crate::report::figure::{Figure, Group, figure, group};
+use crate::report::text::as_text;
 use clap::Args;
 use hal_adapters::can::Layout;
 use std::path::PathBuf;
@@ -93,7 +94,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
     let inputs = [&args.bus, &args.reference, &args.stage].map(PathBuf::as_path);
     super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
     let report = import::run(&args.settings())?;
-    terminal::print(&as_text(&tables(&report, &[])))?;
+    terminal::print(&as_text(&figures(&report).tables()))?;
     let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";
     terminal::warn(
         report
@@ -102,4 +103,64 @@ pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
             .as_slice(),
     );
     super::wrote([args.out.clone()])
+}
+
+fn figures(report: &ImportReport) -> Group {
+    let ImportReport {
+        bus,
+        reference,
+        offset,
+        join,
+        ..
+    } = report;
+    let (health, seen) = (&bus.health, &offset.seen);
+    let us = |us: f64| figure(us, "us");
+    let ends = |ends: [f64; 2]| ends.into_iter().map(us).collect::<Figure>();
+    group! {
+        "bus" => group! {
+            "frames" => bus.frames,
+            "bad lines" => bus.bad_lines,
+            "other lines" => bus.other_lines,
+            "ticks" => bus.ticks,
+            "saturated" => bus.saturated,
+            "untimed" => bus.untimed,
+            "restarts" => bus.restarts,
+            "ticks missing" => bus.ticks_missing,
+            "gaps" => bus.gaps,
+            "lost" => health.lost,
+            "repeated" => health.repeated,
+            "out of sequence" => health.wrong_sequence,
+            "damaged" => health.wrong_check,
+            "of wrong length" => health.wrong_length,
+            "late" => health.late,
+            "incomplete ticks" => health.incomplete,
+        },
+        "reference" => group! {
+            "rows" => reference.rows,
+            "duplicates" => reference.duplicates,
+            "gaps" => reference.gaps,
+            "restarts" => reference.restarts,
+            "has movements" => reference.has_movements,
+        },
+        "offset" => group! {
+            "in the middle" => us(offset.us),
+            "node clock faster by" => offset.rate,
+            "share of motion explained" => seen.explained,
+            "ticks" => seen.ticks,
+            "standard error" => us(seen.standard_error_us),
+            "motion asks for more" => seen.apart_us.map(us),
+        },
+        "join" => group! {
+            "ticks" => join.ticks,
+            "bus" => ends(join.bus_us),
+            "reference" => ends(join.reference_us),
+            "reference in all" => figure(join.reference_s, "s"),
+            "covered" => figure(join.covered_s, "s"),
+            "rows" => join.rows,
+            "outside" => join.outside,
+            "between movements" => join.between_movements,
+            "too far" => join.too_far,
+            "nearest, at most" => us(join.nearest_max_us),
+        },
+    }
 }

@@ -6,10 +6,12 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{blob_file, posterior_file};
 use crate::report::errors;
+use crate::report::figure::{Figure, Group, figure, group};
 use crate::report::parameters::{self, parameters_in};
 use crate::report::provenance::hex;
-use crate::report::table::{as_text, tables};
+use crate::report::text::as_text;
 use clap::Args;
+use hallstage_input::axis::{AXES, Axis};
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::field::posterior::warmth_errors;
 use runtime::matrix::to_rows;
@@ -37,19 +39,15 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let posterior = posterior_file::beside(&args.params);
     let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
-    let mut figures = figures(&set);
     let errors = known
         .as_ref()
         .and_then(|known| warmth_errors(&known.covariance));
-    if let (Some(errors), true) = (errors, set.constants.temperature.is_used()) {
-        figures["temperature"]["standard_errors_per_k"] = json!(errors);
-    }
+    let mut figures = figures(&set, errors.map(|errors| json!(errors)));
     let repaired = known.map(|known| known.repaired);
-    figures["repaired"] = json!(repaired);
+    figures.set("repaired", json!(repaired));
     args.json.write(&figures)?;
     let parameters = parameters::tables(&parameters_in(&set), &[]);
-    let fields = tables(&figures, &["parameters", "repaired"]);
-    let mut text = as_text(&[fields, parameters].concat());
+    let mut text = as_text(&[figures.tables(), parameters].concat());
     if repaired.is_none() && set.model == ModelKind::Field {
         text += "\nfaults taken off: not known, its .posterior is not beside the blob\n";
     }
@@ -67,49 +65,76 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
 }
 
 /// rms and peak of X, Y, Rz as a blob or a controller holds them.
-pub(super) fn errors(rms: [f32; 3], peak: [f32; 3]) -> Value {
-    errors::of(rms.map(f64::from), peak.map(f64::from))
+pub(super) fn errors(rms: [f32; 3], peak: [f32; 3]) -> Group {
+    errors::from_rms_and_peak(rms.map(f64::from), peak.map(f64::from))
 }
 
-fn figures(set: &ParameterSet) -> Value {
+/// Rows of numbers.
+fn matrix(rows: &[[f32; 3]; 3]) -> Figure {
+    rows.iter()
+        .map(|row| row.iter().map(|x| f64::from(*x)).collect::<Figure>())
+        .collect()
+}
+
+/// Two whole numbers of thousandths of a unit.
+fn thousandths<T: Into<f64>>(values: [T; 2], unit: &'static str) -> Figure {
+    let one = |value: T| figure(value.into() * 1e-3, unit);
+    values.into_iter().map(one).collect()
+}
+
+fn figures(set: &ParameterSet, errors_per_k: Option<Value>) -> Group {
     let c = &set.constants;
-    let temperature = c.temperature.is_used().then(|| {
-        json!({
-            "k_h_per_k": c.temperature.per_mk.map(|row| row.map(|x| f64::from(x) * 1e3)),
-            "t0_c": c.temperature.zero_mc.map(|mc| f64::from(mc) * 1e-3),
-            "reach_k": c.temperature.reach_mk.map(|mk| f64::from(mk) * 1e-3),
-        })
-    });
-    let mut figures = json!({
-        "layout_version": set.layout_version(),
-        "model": Model::of(set.model).name,
-        "serial": set.serial.as_str(),
-        "created": set.created.as_str(),
-        "logs_sha256": hex(&set.logs_sha256),
-        "fit": {
-            "rows": set.fit.rows,
-            "train_rows": set.fit.train_rows,
-            "forced": set.fit.forced,
-            "errors": errors(set.fit.rms, set.fit.peak),
+    let per_count = |scale: f32| figure(f64::from(scale), "m/count");
+    let ends = [c.calibrated_planar, c.calibrated_vertical].concat();
+    let range = |(axis, end): (&Axis, f32)| {
+        (
+            axis.key.to_owned(),
+            figure(f64::from(end), axis.unit).into(),
+        )
+    };
+    let window = |window: &runtime::frame::CodeWindow| {
+        [window.low, window.high].into_iter().collect::<Figure>()
+    };
+    let mut figures = group! {
+        "layout_version" => u32::from(set.layout_version()),
+        "model" => Model::of(set.model).name,
+        "serial" => set.serial.as_str(),
+        "created" => set.created.as_str(),
+        "logs_sha256" => hex(&set.logs_sha256),
+        "fit" => group! {
+            "rows" => set.fit.rows,
+            "train_rows" => set.fit.train_rows,
+            "forced" => set.fit.forced,
+            "errors" => errors(set.fit.rms, set.fit.peak),
         },
-        "parameters": parameters_in(set),
-        "plane_matrix": to_rows(&set.plane),
-        "plane_matrix_inverse": to_rows(&set.plane_inverse),
-        "hall_m_per_count": set.hall.m_per_code,
-        "capacitive_m_per_count": set.capacitive.m_per_code,
-        "capacitive_plane_matrix": to_rows(&set.capacitive.vertical_per_m),
-        "planar_per_code": c.planar_per_code,
-        "vertical_per_code": c.vertical_per_code,
-        "calibrated_range": {
-            "x_m": c.calibrated_planar[0], "y_m": c.calibrated_planar[1], "rz_rad": c.calibrated_planar[2],
-            "z_m": c.calibrated_vertical[0], "rx_rad": c.calibrated_vertical[1], "ry_rad": c.calibrated_vertical[2],
-        },
-        "sensitivity_min": c.sensitivity_min,
-        "hall_codes": [c.hall_window.low, c.hall_window.high],
-        "capacitive_codes": [c.capacitive_window.low, c.capacitive_window.high],
-    });
-    if let Some(temperature) = temperature {
-        figures["temperature"] = temperature;
+        "parameters" => json!(parameters_in(set)),
+        "plane_matrix" => matrix(&to_rows(&set.plane)),
+        "plane_matrix_inverse" => matrix(&to_rows(&set.plane_inverse)),
+        "hall" => per_count(set.hall.m_per_code),
+        "capacitive" => per_count(set.capacitive.m_per_code),
+        "capacitive_plane_matrix" => matrix(&to_rows(&set.capacitive.vertical_per_m)),
+        "planar_per_code" => matrix(&c.planar_per_code),
+        "vertical_per_code" => matrix(&c.vertical_per_code),
+        "calibrated_range" => Group(AXES.iter().zip(ends).map(range).collect()),
+        "sensitivity_min" => f64::from(c.sensitivity_min),
+        "hall_codes" => window(&c.hall_window),
+        "capacitive_codes" => window(&c.capacitive_window),
+    };
+    if c.temperature.is_used() {
+        let per_k = |row: &[f32; 2]| {
+            row.iter()
+                .map(|x| figure(f64::from(*x) * 1e3, "1/K"))
+                .collect::<Figure>()
+        };
+        let mut temperature = group! {
+            "k_h" => c.temperature.per_mk.iter().map(per_k).collect::<Figure>(),
+            "t0" => thousandths(c.temperature.zero_mc, "degC"),
+            "reach" => thousandths(c.temperature.reach_mk, "K"),
+        };
+        if let Some(errors) = errors_per_k {
+            temperature.set("standard_errors_per_k", errors);
+        }
+        figures.set("temperature", temperature);
     }
     figures
 }

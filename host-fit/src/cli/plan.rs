@@ -7,7 +7,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
 use crate::report::plan::{figures, steps, tables};
-use crate::report::table::as_text;
+use crate::report::text::as_text;
 use clap::Args;
 use hallstage_calibration::plan::temperature::{COLD_S, protocol};
 use hallstage_calibration::plan::{PERIODS_MAX, SECONDS_MAX, plan};
@@ -65,7 +65,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     }
     args.json.add(&mut outputs, &figures)?;
     let written = outputs.commit()?;
-    terminal::print(&as_text(&tables(&figures)))?;
+    terminal::print(&as_text(&tables(&plan, &protocol, &stage)))?;
     terminal::print(&steps(&protocol))?;
     super::wrote(written)
 }

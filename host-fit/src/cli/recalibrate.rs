@@ -7,7 +7,6 @@ use crate::calibrate::Updated;
 use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
-use crate::report::table::tables;
 use clap::Args;
 use hallstage_calibration::recalibrate::{Known, RecalibrateError};
 use hallstage_input::log::ReadOptions;
@@ -78,8 +77,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         let (set, known) = (&updated.new.set, updated.new.known.as_ref());
         posterior_file::add_calibration(&mut outputs, &args.out, set, known)?;
     }
-    let hidden = ["warnings", "findings", "verdict", "predicted"];
-    let details = tables(&updated.figures, &hidden);
+    let details = updated.figures.tables();
     finish(outputs, &details, &updated.warnings, &updated.subject())?;
     updated
         .refusal

@@ -72,7 +72,7 @@ impl Report {
             dataset: &log.dataset,
             provenance,
             warnings: warnings_of(log),
-            errors: None,
+            report: None,
         }
     }
 

@@ -4,7 +4,8 @@
 //! Nothing that a file holds moves the cursor or begins a line here: see [`plain`].
 
 use crate::cli::error::HostError;
-use crate::report::table::{Table, as_text, plain, with_signs};
+use crate::report::table::Table;
+use crate::report::text::{as_text, plain, with_signs};
 use anstyle::{AnsiColor, Style};
 use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};

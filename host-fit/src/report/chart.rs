@@ -2,7 +2,7 @@
 //! width. A chart is a stack of panels over the same abscissa.
 
 use super::axis::{Axis, short};
-use super::table::with_signs;
+use super::text::with_signs;
 use serde::{Serialize, Serializer};
 use std::fmt::Write;
 

@@ -1,9 +1,11 @@
-//! Errors of the pose in a report: as JSON and as tables, over all rows and log by log.
+//! Errors of the pose in a report: over all rows, log by log, and by temperature.
 
-use super::table::{Table, file_name};
+use super::figure::{Group, Item, figure, file, group, micro};
+use super::table::Table;
 use hallstage_calibration::fit::calibration;
 use hallstage_calibration::judge::statistics::{ErrorSums, PoseError};
 use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
+use hallstage_input::axis::PLANAR;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
@@ -11,83 +13,89 @@ use hallstage_solver::problem::parameters::Parameters;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::frame::MISSING_CODE;
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Errors of X, Y, Rz by row, m, m, rad; `None` where there was no pose.
+/// Errors of X, Y, Rz by row, m, m, rad; `None` for a row without pose.
 pub type RowErrors = Vec<Option<[f64; 3]>>;
 
-/// The errors of a log with the designed values, Model (15), no zero deviation taken off. `None` where
-/// no decoder can be made of them, or where it decodes no row.
+/// The errors of a log with the designed values and Model (15), no zero deviation taken off. `None` where these make no
+/// decoder, or decode no row.
 pub fn designed(dataset: &Dataset, stage: &Stage) -> Option<(RowErrors, PoseError)> {
     let model = Model::of(ModelKind::M15);
     let designed = calibration(&dataset.rows, stage, model, &Parameters::designed(stage));
     let decoded = Decoded::new(&designed.prepare(&Origin::default()).ok()?, dataset);
-    let figures = decoded.judge(dataset, stage, Zeros::None).errors;
-    (figures.rows > 0).then_some((decoded.errors, figures))
+    let errors = decoded.judge(dataset, stage, Zeros::None).errors;
+    (errors.rows > 0).then_some((decoded.errors, errors))
 }
 
-/// rms and peak of X, Y (um) and Rz (urad).
-pub fn errors(error: &PoseError) -> Value {
-    of(
+/// rms and peak of X, Y, Rz.
+pub fn errors(error: &PoseError) -> Group {
+    let (rms, peak) = (
         error.axes.map(|axis| axis.rms),
         error.axes.map(|axis| axis.peak),
+    );
+    from_rms_and_peak(rms, peak)
+}
+
+/// The same of X, Y, Rz in SI. The blob of another program may hold an error below zero, or of 1 m or more, which is not
+/// shown.
+pub fn from_rms_and_peak(rms: [f64; 3], peak: [f64; 3]) -> Group {
+    let known = |error: f64| {
+        if (0.0..1.0).contains(&error) {
+            error
+        } else {
+            f64::NAN
+        }
+    };
+    by_axis(|k| {
+        let (rms, peak) = (known(rms[k]), known(peak[k]));
+        group! { "rmse" => micro(&PLANAR[k], rms), "peak" => micro(&PLANAR[k], peak) }
+    })
+}
+
+/// What `item` gives for X, Y and Rz.
+pub fn by_axis<T: Into<Item>>(item: impl Fn(usize) -> T) -> Group {
+    Group(
+        (0..3)
+            .map(|k| (PLANAR[k].key.to_owned(), item(k).into()))
+            .collect(),
     )
 }
 
-/// The same of X, Y, Rz in SI. An error below zero, or of 1 m or more, which the blob of another program
-/// may hold, is null.
-pub fn of(rms: [f64; 3], peak: [f64; 3]) -> Value {
-    let micro = |error: f64| (0.0..1.0).contains(&error).then_some(error * 1e6);
-    let axis = |k: usize, unit: &str| json!({ format!("rmse_{unit}"): micro(rms[k]), format!("peak_{unit}"): micro(peak[k]) });
-    json!({ "x": axis(0, "um"), "y": axis(1, "um"), "rz": axis(2, "urad") })
+/// X, Y, Rz in SI as figures.
+pub fn pose(axes: [f64; 3]) -> Group {
+    by_axis(|k| micro(&PLANAR[k], axes[k]))
 }
 
 /// rms and peak of X, Y (um) and Rz (urad).
-pub fn micro(error: &PoseError) -> [[f64; 2]; 3] {
+pub fn to_micro(error: &PoseError) -> [[f64; 2]; 3] {
     error.axes.map(|axis| [axis.rms * 1e6, axis.peak * 1e6])
 }
 
-/// A table with a row of rms and peak for each entry (um, um, urad); what is not known is NaN.
+/// A table with a row of rms and peak for each entry (um, um, urad). NaN stands for an unknown error.
 pub fn error_table(
     title: &str,
     rows: impl IntoIterator<Item = (impl Into<String>, [[f64; 2]; 3])>,
 ) -> Table {
-    let titles = [
-        "X rms, um",
-        "peak",
-        "Y rms, um",
-        "peak",
-        "Rz rms, urad",
-        "peak",
-    ];
-    let mut table = Table::new(title, &titles);
+    let mut table = Table::new(title, &["X rms", "peak", "Y rms", "peak", "Rz rms", "peak"]);
     for (what, errors) in rows {
-        table.row(what, errors.as_flattened().iter().map(|x| cell(*x)));
+        let axis = |k: usize| errors[k].map(|error| figure(error, PLANAR[k].micro));
+        table.row(what, [0, 1, 2].map(axis).concat());
     }
     table
 }
 
-/// An error in um or urad.
-fn cell(x: f64) -> String {
-    match x.is_nan() {
-        true => "-".to_owned(),
-        false => format!("{x:.3}"),
-    }
-}
-
-/// The errors of each log over all its rows.
-pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Value> {
+/// The errors of each log.
+pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Group> {
     let logs = dataset.logs.iter().zip(&judgement.logs);
-    let figures = logs.map(|(log, judged)| {
-        let path = file_name(&log.path);
-        json!({ "path": path, "rows": judged.rows, "errors": errors(&judged.errors) })
-    });
-    figures.collect()
+    logs.map(|(log, judged)| {
+        group! { "path" => file(&log.path), "rows" => judged.rows, "errors" => errors(&judged.errors) }
+    })
+    .collect()
 }
 
 /// The errors of rows by whole degrees of mount and body; empty where the log has no temperatures.
-pub(super) fn by_temperature(dataset: &Dataset, by_row: &RowErrors) -> Vec<Value> {
+pub(super) fn by_temperature(dataset: &Dataset, by_row: &RowErrors) -> Vec<Group> {
     let mut degrees: BTreeMap<(usize, i32), ErrorSums> = BTreeMap::new();
     for (index, (row, error)) in dataset.rows.iter().zip(by_row).enumerate() {
         for (sensor, read_mc) in row.frame.temperature_mc().into_iter().enumerate() {
@@ -98,14 +106,15 @@ pub(super) fn by_temperature(dataset: &Dataset, by_row: &RowErrors) -> Vec<Value
             }
         }
     }
-    let value = |((sensor, degree), sums): ((usize, i32), ErrorSums)| {
-        json!({
-            "sensor": (["mount", "body"][sensor]),
-            "from_c": degree,
-            "to_c": degree + 1,
-            "rows": sums.rows,
-            "errors": errors(&sums.errors()),
-        })
+    let celsius = |degree: i32| figure(f64::from(degree), "degC");
+    let group = |((sensor, degree), sums): ((usize, i32), ErrorSums)| {
+        group! {
+            "sensor" => ["mount", "body"][sensor],
+            "from" => celsius(degree),
+            "to" => celsius(degree + 1),
+            "rows" => sums.rows,
+            "errors" => errors(&sums.errors()),
+        }
     };
-    degrees.into_iter().map(value).collect()
+    degrees.into_iter().map(group).collect()
 }

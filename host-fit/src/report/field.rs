@@ -1,8 +1,9 @@
-//! What a fit of the field model says of itself: noise, uncertainty of the pose, correlations.
+//! Figures of a fit of the field model: noise, uncertainty of the pose, correlations.
 
+use super::errors::pose;
+use super::figure::{Figure, Group, figure, group};
 use hallstage_solver::solve::field::fit::FieldFit;
 use hallstage_solver::solve::field::posterior::PoseUncertainty;
-use serde_json::{Value, json};
 
 /// Pairs and directions that are reported.
 const PAIRS: usize = 10;
@@ -10,52 +11,47 @@ const DIRECTIONS: usize = 3;
 /// Parameters named of a direction.
 const PARTS: usize = 4;
 
-/// X and Y in um, Rz in urad, of SI.
-pub fn by_axis(axes: [f64; 3]) -> Value {
-    let [x, y, rz] = axes.map(|x| x * 1e6);
-    json!({ "x_um": x, "y_um": y, "rz_urad": rz })
-}
-
 /// Two parameters that stand in for each other, and their correlation, from -1 to 1.
-pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Value {
-    json!({ "parameters": [a, b], "correlation": correlation })
+pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Group {
+    let both: Figure = [a.as_str(), b.as_str()].into_iter().collect();
+    group! { "parameters" => both, "correlation" => *correlation }
 }
 
-/// What a fit of the field model says of itself: white noise of the probes A, B, C; the random walk of the
-/// reference, which grows with the root of time; what is predicted for a pose by the parameters, the same
-/// at every visit, and by the noise of the probes, new in every servo period; the strongest correlations;
-/// and the combinations of parameters that the log determines worst, with their variance over that of
-/// independent parameters and the largest shares in terms of standard errors.
-pub fn figures(fit: &FieldFit) -> Value {
+/// White noise of the probes A, B, C; the random walk of the reference, which grows with the root of time; the uncertainty
+/// of a pose by the parameters (the same at every visit) and by the noise of the probes (new in every servo period); the
+/// strongest correlations; and the combinations of parameters that the log determines worst, with their variance over that
+/// of independent parameters and the largest shares in terms of standard errors.
+pub fn figures(fit: &FieldFit) -> Group {
     let posterior = &fit.posterior;
     let pairs = posterior.strongest_correlations(PAIRS);
     let directions = posterior.weakest_directions(DIRECTIONS, PARTS).into_iter();
-    let directions =
-        directions.map(|weak| json!({ "inflation": weak.inflation, "shares": weak.parts }));
-    json!({
-        "hall_noise_um": fit.noise.white_mm.map(|mm| mm * 1e3),
-        "reference_drift_after_1_s": by_axis(fit.noise.drift_mm.map(|mm| mm * 1e-3)),
-        "pose_uncertainty": predictions(fit),
-        "strongest_correlations": pairs.iter().map(correlation).collect::<Vec<_>>(),
-        "weakest_directions": directions.collect::<Vec<_>>(),
-    })
+    let directions = directions.map(|weak| {
+        let share = |(name, share): (String, f64)| Figure::List(vec![name.into(), share.into()]);
+        let shares: Vec<Figure> = weak.parts.into_iter().map(share).collect();
+        group! { "inflation" => weak.inflation, "shares" => Figure::List(shares) }
+    });
+    let noise = fit.noise.white_mm.map(|mm| figure(mm * 1e3, "um"));
+    group! {
+        "hall_noise" => Figure::List(noise.into()),
+        "reference_drift_after_1_s" => pose(fit.noise.drift_mm.map(|mm| mm * 1e-3)),
+        "pose_uncertainty" => predictions(fit),
+        "strongest_correlations" => pairs.iter().map(correlation).collect::<Vec<_>>(),
+        "weakest_directions" => directions.collect::<Vec<_>>(),
+    }
 }
 
-/// At rest, as a mean over the range of the log, and at the worst corner of it.
-fn predictions(fit: &FieldFit) -> Vec<Value> {
-    let of = |place: &str, systematic: [f64; 3], noise: [f64; 3]| {
+/// At rest, as a mean over the range of the log, and at its worst corner.
+fn predictions(fit: &FieldFit) -> Vec<Group> {
+    let group = |place: &str, systematic: [f64; 3], noise: [f64; 3]| {
         let [systematic, noise] =
-            [systematic, noise].map(|variances| by_axis(variances.map(f64::sqrt)));
-        json!({ "place": place, "systematic": systematic, "noise": noise })
+            [systematic, noise].map(|variances| pose(variances.map(f64::sqrt)));
+        group! { "place" => place, "systematic" => systematic, "noise" => noise }
     };
     let diagonal = |at: &PoseUncertainty| {
-        let of = |m: &nalgebra::Matrix3<f64>| [0, 1, 2].map(|k| m[(k, k)]);
-        (of(&at.systematic), of(&at.noise))
+        let diagonal = |m: &nalgebra::Matrix3<f64>| [0, 1, 2].map(|k| m[(k, k)]);
+        (diagonal(&at.systematic), diagonal(&at.noise))
     };
-    let rest = fit
-        .posterior
-        .at_pose([0.0; 3], [0.0; 3])
-        .map(|at| diagonal(&at));
+    let rest = fit.posterior.at_pose([0.0; 3], [0.0; 3]);
     let corners = (0..64).filter_map(|corner: u32| {
         let side = |axis: usize| if corner >> axis & 1 == 0 { 1.0 } else { -1.0 };
         let planar = [0, 1, 2].map(|k| side(k) * fit.planar_range[k]);
@@ -68,13 +64,16 @@ fn predictions(fit: &FieldFit) -> Vec<Value> {
         (larger(a, c), larger(b, d))
     });
     let service = &fit.verdict.service;
-    let mut all = Vec::new();
-    all.extend(rest.map(|(systematic, noise)| of("at rest", systematic, noise)));
-    all.push(of(
-        "mean over the range of the log",
-        service.systematic,
-        service.noise,
-    ));
-    all.extend(worst.map(|(systematic, noise)| of("worst corner of the range", systematic, noise)));
-    all
+    let mean = Some((service.systematic, service.noise));
+    let places = [
+        ("at rest", rest.map(|at| diagonal(&at))),
+        ("mean over the range of the log", mean),
+        ("worst corner of the range", worst),
+    ];
+    let known = places
+        .into_iter()
+        .filter_map(|(place, variances)| Some((place, variances?)));
+    known
+        .map(|(place, (systematic, noise))| group(place, systematic, noise))
+        .collect()
 }

@@ -2,7 +2,8 @@
 //! all; its name ends in `.html`, so that every text is escaped.
 
 use super::chart::Chart;
-use super::table::{Table, with_signs};
+use super::table::Table;
+use super::text::with_signs;
 use super::verdict::Summary;
 use hallstage_calibration::words::Worded;
 use hallstage_input::finding::{Code, Finding, Severity};

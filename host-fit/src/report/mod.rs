@@ -2,18 +2,21 @@
 
 pub mod axis;
 pub mod chart;
+mod charts;
 pub mod errors;
 pub mod field;
-mod figures;
+pub mod figure;
 pub mod html;
-pub mod json;
+mod json;
 pub mod page;
 pub mod parameters;
 pub mod plan;
 pub mod provenance;
+pub mod result;
 mod series;
 pub mod table;
+pub mod text;
 pub mod trusted;
 pub mod verdict;
 
-pub use figures::Density;
+pub use charts::Density;

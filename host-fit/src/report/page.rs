@@ -1,30 +1,26 @@
 //! The report of logs and what was made of them as one HTML page, written whether or not there is a
 //! calibration: a certificate first, then what it rests on.
 
-use super::errors::{RowErrors, designed, error_table, micro};
-use super::figures::Log;
+use super::charts::Log;
+use super::errors::{designed, error_table, to_micro};
 use super::html::{Cause, Page, Section};
-use super::json::{MovementZero, Report};
-use super::parameters::{self, Parameter};
+use super::parameters;
 use super::provenance::Provenance;
-use super::table::{self, Table};
+use super::result::Report;
+use super::table::Table;
+use super::text::file_name;
 use super::verdict::{Subject, Summary};
-use hallstage_calibration::fit::Fit;
 use hallstage_calibration::judge::predicted::Validity;
-use hallstage_calibration::judge::statistics::{PoseError, white_noise};
+use hallstage_calibration::judge::statistics::white_noise;
+use hallstage_input::axis::{AXES, Axis};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use minijinja::Error;
-use runtime::{ModelKind, ParameterSet};
-use std::collections::BTreeMap;
+use runtime::ModelKind;
 
 /// Movements that the page lists.
 const MOVEMENTS_MAX: usize = 1000;
-
-const PAPER: &str = "The figures that the paper has, of this log: Fig. 9 (displacements and Hall signals) and Figs 10 to 12 \
-     (errors with the designed values and after calibration) of Z. Chen et al., \"Calibration of the Hall Measurement System \
-     for a 6-DOF Precision Stage Using Self-Adaptive Hybrid TLBO\", Sensors 2016.";
 
 /// What a report is made of.
 #[derive(Clone, Debug)]
@@ -43,40 +39,8 @@ pub struct Source<'a> {
     pub provenance: Provenance,
     /// Warnings from reading the logs.
     pub warnings: Vec<String>,
-    /// The errors, if there is a fit or a blob.
-    pub errors: Option<Errors<'a>>,
-}
-
-/// The errors of a fit, or of a blob.
-#[derive(Clone, Debug)]
-pub struct Errors<'a> {
-    /// The blob.
-    pub set: &'a ParameterSet,
-    /// By row of the dataset, zero deviations taken off.
-    pub by_row: RowErrors,
-    /// Over these.
-    pub figures: &'a PoseError,
-    /// The movements of the logs.
-    pub movements: &'a [MovementZero],
-    /// The parameters by name.
-    pub parameters: &'a BTreeMap<String, Parameter>,
-    /// More figures.
-    pub details: Vec<Table>,
-}
-
-impl<'a> Errors<'a> {
-    /// Of a fit to a dataset.
-    pub fn of_fit(fit: &'a Fit, dataset: &Dataset, report: &'a Report) -> Self {
-        let judgement = &fit.judgement;
-        Self {
-            set: &fit.set,
-            by_row: fit.decoded.errors_less(&judgement.zeros, dataset),
-            figures: &judgement.errors,
-            movements: &report.zero_deviations,
-            parameters: &report.parameters,
-            details: report.details(&["errors"]),
-        }
-    }
+    /// The report, if there is a fit or a blob.
+    pub report: Option<&'a Report>,
 }
 
 /// What a person says of a run, in the order of a certificate.
@@ -115,30 +79,13 @@ impl Source<'_> {
             dataset,
             period_s: (dataset.period_s(0..dataset.rows.len())).unwrap_or(stage.servo_period_s),
         };
-        let before = designed(dataset, stage);
         let mut sections = Vec::new();
-        if let Some(errors) = &self.errors {
-            sections.extend(self.of_errors(&log, errors, before.as_ref()));
+        if let Some(report) = self.report {
+            sections.extend(self.sections(&log, report));
         }
         sections.push(Section {
             title: "Provenance",
             tables: vec![self.provenance.0.clone()],
-            ..Section::default()
-        });
-        let before =
-            before.map(|(rows, _)| log.errors("Errors with the designed values", &rows, None));
-        let after = self.errors.as_ref();
-        let after =
-            after.map(|errors| log.errors("Errors after calibration", &errors.by_row, None));
-        sections.push(Section {
-            title: "Appendix: figures of the paper",
-            notes: vec![PAPER.to_owned()],
-            charts: log
-                .signals()
-                .into_iter()
-                .chain(before)
-                .chain(after)
-                .collect(),
             ..Section::default()
         });
         let page = Page {
@@ -156,20 +103,18 @@ impl Source<'_> {
     fn facts(&self) -> Vec<[String; 2]> {
         let mut facts = self.facts.clone();
         let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);
-        if let Some(Errors { set, .. }) = &self.errors {
+        if let Some(Report { set, .. }) = self.report {
             let c = &set.constants;
-            let [x, y, rz] = c.calibrated_planar.map(|x| f64::from(x) * 1e6);
-            let [z, rx, ry] = c.calibrated_vertical.map(|x| f64::from(x) * 1e6);
-            add(
-                "valid for",
-                format!(
-                    "X ±{x:.0} um, Y ±{y:.0} um, Rz ±{rz:.0} urad, Z ±{z:.0} um, Rx ±{rx:.0} urad, Ry ±{ry:.0} urad, {}",
-                    match set.model {
-                        ModelKind::Field => "all axes moving",
-                        _ => "movements like those of the log",
-                    }
-                ),
-            );
+            let ends = [c.calibrated_planar, c.calibrated_vertical].concat();
+            let range = |(axis, end): (&Axis, f32)| {
+                format!("{} ±{:.0} {}", axis.name, end * 1e6, axis.micro)
+            };
+            let mut ranges: Vec<String> = AXES.iter().zip(ends).map(range).collect();
+            ranges.push(match set.model {
+                ModelKind::Field => "all axes moving".to_owned(),
+                _ => "movements like those of the log".to_owned(),
+            });
+            add("valid for", ranges.join(", "));
             add("model", Model::of(set.model).title());
         }
         add("temperature", self.temperature());
@@ -178,11 +123,7 @@ impl Source<'_> {
             "laser interferometers X, Y1, Y2, as logged".to_owned(),
         );
         let (rows, movements) = self.dataset.read();
-        let logs = self
-            .dataset
-            .logs
-            .iter()
-            .map(|log| table::file_name(&log.path));
+        let logs = self.dataset.logs.iter().map(|log| file_name(&log.path));
         let logs: Vec<String> = logs.collect();
         let movements = match movements {
             1 => "one movement".to_owned(),
@@ -218,51 +159,47 @@ impl Source<'_> {
         parts.join("; ")
     }
 
-    /// What there is to show of errors.
-    fn of_errors(
-        &self,
-        log: &Log,
-        errors: &Errors,
-        before: Option<&(RowErrors, PoseError)>,
-    ) -> [Section; 5] {
-        let noise = white_noise(&errors.by_row, &self.dataset.movements);
-        let after = format!("after: {}", Model::of(errors.set.model).title());
+    /// Errors, parameters, movements and all other figures.
+    fn sections(&self, log: &Log, report: &Report) -> [Section; 5] {
+        let noise = white_noise(&report.by_row, &self.dataset.movements);
+        let before = designed(self.dataset, self.stage);
+        let after = format!("after: {}", Model::of(report.set.model).title());
         let rows = [
-            before.map(|(_, errors)| ("before: designed values, Model (15)", micro(errors))),
-            Some((after.as_str(), micro(errors.figures))),
+            before
+                .as_ref()
+                .map(|(_, errors)| ("before: designed values, Model (15)", to_micro(errors))),
+            Some((after.as_str(), to_micro(&report.over_rows))),
             Some(("noise from row to row", noise.map(|x| [x * 1e6, f64::NAN]))),
         ];
-        let before = before.map(|(rows, _)| rows);
-        let of_log = Section {
+        let before = before.as_ref().map(|(rows, _)| rows);
+        let on_log = Section {
             title: "Errors on the log",
             notes: vec![
                 "Decoded by the code of the target; zero deviations refitted where the model has them.".to_owned(),
             ],
             tables: vec![error_table("", rows.into_iter().flatten())],
             charts: vec![
-                log.errors("Before (grey) and after (blue), on one scale", &errors.by_row, before),
-                log.errors("After, enlarged", &errors.by_row, None),
+                log.errors("Before (grey) and after (blue), on one scale", &report.by_row, before),
+                log.errors("After, enlarged", &report.by_row, None),
             ],
         };
-        let mut against = log.against(&errors.by_row, noise);
-        against.extend(log.spectrum(&errors.by_row, noise));
+        let mut against = log.against(&report.by_row, noise);
+        against.extend(log.spectrum(&report.by_row, noise));
         let residuals = Section {
             title: "Errors against pose, signals and frequency",
             notes: vec![
-                "Line: mean of the errors. Band: two of their standard deviations. Orange lines: two standard deviations of the \
-                 noise from row to row. Where the mean leaves zero over a long way, the model lacks something."
+                "Line: mean of the errors. Band: two standard deviations of the errors. Orange lines: two standard deviations \
+                 of the noise from row to row. Where the mean leaves zero over a long way, the model lacks something."
                     .to_owned(),
             ],
             charts: against,
             ..Section::default()
         };
         let designed = [("designed", parameters::designed(self.stage))];
-        let mut tables = parameters::tables(errors.parameters, &designed);
+        let mut tables = parameters::tables(&report.parameters, &designed);
         for table in &mut tables {
-            table.columns.push("meaning".to_owned());
-            for row in &mut table.rows {
-                row.push(parameters::meaning(&row[0]));
-            }
+            let names = table.rows.iter().map(|(name, _)| parameters::meaning(name));
+            table.remarks = names.collect();
         }
         let parameters = Section {
             title: "Parameters",
@@ -274,19 +211,18 @@ impl Source<'_> {
             tables,
             ..Section::default()
         };
-        let mut movements = table::list("movements", errors.movements);
-        movements.rows.truncate(MOVEMENTS_MAX);
+        let movements = &report.movements[..report.movements.len().min(MOVEMENTS_MAX)];
         let movements = Section {
             title: "Movements",
-            tables: vec![movements],
+            tables: vec![Table::from_groups("movements", movements)],
             ..Section::default()
         };
-        let trust = Section {
+        let more = Section {
             title: "More figures",
-            tables: errors.details.clone(),
+            tables: report.figures.tables(),
             ..Section::default()
         };
-        [of_log, residuals, parameters, movements, trust]
+        [on_log, residuals, parameters, movements, more]
     }
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::report::json::{Circumstances, of_eval};
+use crate::report::result::{Circumstances, Judged};
 use crate::report::verdict::End;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
@@ -10,27 +10,25 @@ use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, stage};
 
-/// Every 20th row of the shipped log, each movement as often as `copies` says.
-fn shipped(stage: &Stage, copies: usize) -> Dataset {
+/// Every 20th row of the shipped log.
+fn shipped(stage: &Stage) -> Dataset {
     let read = read_bytes(LOG_GZ, "log".as_ref(), stage, &ReadOptions::default());
     let read = read.expect("sound");
     let mut dataset = Dataset {
         sha256: read.dataset.sha256,
         ..Dataset::default()
     };
-    for _ in 0..copies {
-        for movement in &read.dataset.movements {
-            let (start, number) = (dataset.rows.len(), dataset.movements.len());
-            let rows = read.dataset.rows[movement.rows.clone()].iter().step_by(20);
-            dataset.rows.extend(rows.map(|row| Row {
-                movement: number,
-                ..*row
-            }));
-            dataset.movements.push(Movement {
-                rows: start..dataset.rows.len(),
-                ..movement.clone()
-            });
-        }
+    for movement in &read.dataset.movements {
+        let (start, number) = (dataset.rows.len(), dataset.movements.len());
+        let rows = read.dataset.rows[movement.rows.clone()].iter().step_by(20);
+        dataset.rows.extend(rows.map(|row| Row {
+            movement: number,
+            ..*row
+        }));
+        dataset.movements.push(Movement {
+            rows: start..dataset.rows.len(),
+            ..movement.clone()
+        });
     }
     dataset.logs.clear();
     dataset.end_log("a <log> & more.csv");
@@ -59,14 +57,14 @@ fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> S
         dataset,
         provenance,
         warnings: Vec::new(),
-        errors: None,
+        report: None,
     }
 }
 
 #[test]
 fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
     let stage = stage();
-    let dataset = shipped(&stage, 1);
+    let dataset = shipped(&stage);
     let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
     let diagnosis = Diagnosis {
         verdict: Some(Verdict::Limited),
@@ -80,19 +78,20 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         warnings: Vec::new(),
         diagnosis: diagnosis.clone(),
     };
-    let judged = of_eval(
-        &fit.set,
-        &fit.judgement,
-        Zeros::Refit,
-        &Vec::new(),
-        &circumstances,
-    );
+    let judged = Judged {
+        set: &fit.set,
+        judgement: &fit.judgement,
+        zeros: Zeros::Refit,
+        by_row: &fit.decoded.errors_less(&fit.judgement.zeros, &dataset),
+        over_rows: fit.judgement.errors,
+    };
+    let report = Report::from_judgement(judged, &circumstances);
     let subject = Subject {
         errors: Some(&fit.judgement.errors),
         ..subject(End::Written, &diagnosis)
     };
     let source = Source {
-        errors: Some(Errors::of_fit(&fit, &dataset, &judged)),
+        report: Some(&report),
         ..source(&stage, &dataset, subject)
     };
     let page = source.html().expect("a page");
@@ -102,20 +101,18 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         "X ±",
         "movements like those of the log",
         "on one scale",
-        "Displacements by the interferometers",
         "Errors against Rz",
         "Errors against signal C",
         "Amplitude spectral density",
         "sensitivity at rest over the designed one",
-        "Sensors 2016",
         "X rms, µm",
         "prefers-color-scheme: dark",
         "table-header-group",
     ] {
         assert!(page.contains(part), "no `{part}`");
     }
-    // Before and after, nine quantities, spectrum; in the appendix signals and both errors.
-    assert_eq!(page.matches("<svg ").count(), 17);
+    // Before and after, nine quantities, spectrum.
+    assert_eq!(page.matches("<svg ").count(), 12);
     for part in [
         "http:", "https:", "src=", "<script", "@import", "url(", "NaN", " um", " urad",
     ] {
@@ -134,7 +131,7 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
 }
 
 #[test]
-fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with_the_rows() {
+fn the_page_of_a_refused_log_has_its_findings_by_cause() {
     let stage = stage();
     let found = |log: &str, cost| Finding {
         log: Some(log.to_owned()),
@@ -144,27 +141,17 @@ fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with
         findings: vec![found("A & B.csv", 3.0), found("C.csv", 7.25)],
         ..Diagnosis::default()
     };
-    let length = |copies: usize| {
-        let dataset = shipped(&stage, copies);
-        let source = Source {
-            warnings: vec!["a line is cut".to_owned()],
-            ..source(
-                &stage,
-                &dataset,
-                subject(End::Failed("it does not fit"), &diagnosis),
-            )
-        };
-        let page = source.html().expect("a page");
-        assert!(page.contains("Refused</b>: it does not fit"));
-        // One cause, with the cost of the worst.
-        assert_eq!(page.matches("<code>jitter</code>").count(), 1);
-        assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));
-        assert!(page.contains("A &amp; B.csv: Rows come"));
-        assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
-        // Signals, and errors with the designed values.
-        assert_eq!(page.matches("<svg ").count(), 4);
-        page.len()
+    let dataset = shipped(&stage);
+    let refused = subject(End::Failed("it does not fit"), &diagnosis);
+    let source = Source {
+        warnings: vec!["a line is cut".to_owned()],
+        ..source(&stage, &dataset, refused)
     };
-    let (short, long) = (length(1), length(8));
-    assert!(long < short + short / 2, "{short} {long}");
+    let page = source.html().expect("a page");
+    assert!(page.contains("Refused</b>: it does not fit"));
+    // One cause, with the cost of the worst.
+    assert_eq!(page.matches("<code>jitter</code>").count(), 1);
+    assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));
+    assert!(page.contains("A &amp; B.csv: Rows come"));
+    assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
 }

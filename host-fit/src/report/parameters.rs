@@ -1,15 +1,15 @@
-//! Parameters by name in JSON.
+//! The parameters of a model by name.
 
-use crate::report::table::{Table, number, with_error};
+use super::figure::{Figure, Group, bare, figure, group};
+use super::table::Table;
+use hallstage_input::axis::PROBES;
 use hallstage_input::stage::{Stage, paper_signs};
 use hallstage_solver::problem::model::{COUNT, Model, ParameterId};
 use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::problem::terms::shown;
 use hallstage_solver::solve::field::parameters::values_of;
 use hallstage_solver::solve::field::terms::{self, BEYOND_MODEL_31, PER_PROBE};
 use runtime::{ModelKind, ParameterSet};
 use serde::Serialize;
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// One parameter.
@@ -24,18 +24,20 @@ pub struct Parameter {
     pub standard_error: Option<f64>,
 }
 
+impl From<Parameter> for Figure {
+    fn from(parameter: Parameter) -> Self {
+        bare(parameter.value, parameter.unit).with_error(parameter.standard_error)
+    }
+}
+
 /// The six coordinates nearest to the designed ones: a choice, not a measurement.
-pub fn coordinates(places_m: [[f64; 2]; 3]) -> Value {
-    let [[h1x_m, h1y_m], [h2x_m, h2y_m], [h3x_m, h3y_m]] = paper_signs(places_m);
-    json!({
-        "h1x_m": h1x_m,
-        "h1y_m": h1y_m,
-        "h2x_m": h2x_m,
-        "h2y_m": h2y_m,
-        "h3x_m": h3x_m,
-        "h3y_m": h3y_m,
-        "note": "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
-    })
+pub fn coordinates(places_m: [[f64; 2]; 3]) -> Group {
+    let [[h1x, h1y], [h2x, h2y], [h3x, h3y]] = paper_signs(places_m);
+    let m = |x: f64| figure(x, "m");
+    group! {
+        "h1x" => m(h1x), "h1y" => m(h1y), "h2x" => m(h2x), "h2y" => m(h2y), "h3x" => m(h3x), "h3y" => m(h3y),
+        "note" => "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
+    }
 }
 
 /// The parameters of a model by name, with their standard errors where they are known.
@@ -100,70 +102,55 @@ pub fn temperature_parameters_in(set: &ParameterSet) -> BTreeMap<String, Paramet
     named.map(one).filter(|_| temperature.is_used()).collect()
 }
 
-/// A table with a row for each term, and with the given columns for each probe. `cells` gives
-/// them for a parameter by its name and the factor from SI to the unit of the row, as
-/// misalignments are in mrad; a term that it gives none for is left out.
+/// A table with a row for each term, and with the given columns for each probe. `figures` gives them for a parameter by
+/// its name and unit. A term without figures is left out.
 pub fn by_probe<'c>(
     title: &str,
     terms: std::ops::Range<usize>,
     columns: &[&'c str],
-    cells: impl Fn(&str, f64) -> Option<Vec<String>>,
+    figures: impl Fn(&str, &'static str) -> Option<Vec<Figure>>,
 ) -> Table {
-    let of_probe = |probe: &'static str| {
+    let titled = |probe: &'static str| {
         let title = |column: &&'c str| if column.is_empty() { probe } else { *column };
         columns.iter().map(title).collect::<Vec<_>>()
     };
-    let titles = ["A", "B", "C"].into_iter().flat_map(of_probe);
-    let titles: Vec<&str> = titles.chain(["unit"]).collect();
+    let titles: Vec<&str> = PROBES.into_iter().flat_map(titled).collect();
     let mut table = Table::new(title, &titles);
     for term in terms {
-        let (scale, unit) = shown(1.0, terms::TERMS[term].unit);
-        let probes = [0, 1, 2].map(|probe| cells(&terms::name(probe * PER_PROBE + term), scale));
+        let (name, unit) = (terms::TERMS[term].name, terms::TERMS[term].unit);
+        let probes = [0, 1, 2].map(|probe| figures(&terms::name(probe * PER_PROBE + term), unit));
         if let [Some(a), Some(b), Some(c)] = probes {
-            table.row(
-                terms::TERMS[term].name,
-                [a, b, c, vec![unit.to_owned()]].concat(),
-            );
+            let figures = [a, b, c].concat();
+            table.row(name, figures.iter().map(|figure| figure.readable(false)));
         }
     }
     table
 }
 
-/// Parameters with their standard errors in the last digits: those of Model (31), beside values of the
-/// same names if there are any, and those beyond it.
+/// Parameters with their standard errors: the parameters of Model (31), beside values of the same names if there are any,
+/// and those beyond it.
 pub fn tables(
     parameters: &BTreeMap<String, Parameter>,
     beside: &[(&str, BTreeMap<String, f64>)],
 ) -> Vec<Table> {
-    let value = |name: &str, scale: f64| {
-        let p = parameters.get(name)?;
-        Some(with_error(
-            p.value * scale,
-            p.standard_error.map(|error| error * scale),
-        ))
-    };
-    let columns: Vec<&str> = [""]
-        .into_iter()
-        .chain(beside.iter().map(|(title, _)| *title))
-        .collect();
-    let of_31 = by_probe("parameters", 0..BEYOND_MODEL_31, &columns, |name, scale| {
+    let titles = beside.iter().map(|(title, _)| *title);
+    let columns: Vec<&str> = [""].into_iter().chain(titles).collect();
+    let of_31 = by_probe("parameters", 0..BEYOND_MODEL_31, &columns, |name, unit| {
         let beside = beside.iter().map(|(_, values)| {
-            values
-                .get(name)
-                .map_or("-".to_owned(), |x| number(x * scale, ""))
+            let value = values.get(name);
+            value.map_or(Figure::None, |x| bare(*x, unit))
         });
-        Some(std::iter::once(value(name, scale)?).chain(beside).collect())
+        let own = Figure::from(*parameters.get(name)?);
+        Some(std::iter::once(own).chain(beside).collect())
     });
     let beyond = by_probe(
         "field terms",
         BEYOND_MODEL_31..PER_PROBE,
         &[""],
-        |name, scale| Some(vec![value(name, scale)?]),
+        |name, _| Some(vec![Figure::from(*parameters.get(name)?)]),
     );
-    [of_31, beyond]
-        .into_iter()
-        .filter(|table| !table.rows.is_empty())
-        .collect()
+    let tables = [of_31, beyond].into_iter();
+    tables.filter(|table| !table.rows.is_empty()).collect()
 }
 
 /// What a term means, in a line.

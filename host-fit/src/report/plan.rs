@@ -1,28 +1,33 @@
-//! The figures of a planned run: as JSON and as tables.
+//! A planned run: its figures, and its tables.
 
+use super::errors::by_axis;
+use super::figure::{Figure, Group, bare, figure, group, micro};
 use super::parameters::by_probe;
-use super::table::{Table, number};
+use super::table::Table;
 use hallstage_calibration::plan::Plan;
 use hallstage_calibration::plan::temperature::WarmLog;
-use hallstage_input::axis::{AXES, Axis};
+use hallstage_input::axis::{AXES, PLANAR};
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
-/// How many of the least determined parameters are named.
+/// Number of the least determined parameters that are named.
 const NAMED: usize = 5;
-/// The figures of a plan. Axes are in m and rad; `of_prior` is the standard error over the deviation of
-/// the prior, 1 where the log adds nothing.
-pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Value {
+
+/// Predicted standard error of a parameter over the deviation of its prior: 1 where the log adds nothing. `None` without
+/// prior.
+fn over_prior(errors: &[f64; COUNT], k: usize) -> Option<f64> {
+    TERMS[k % PER_PROBE].prior.map(|prior| errors[k] / prior)
+}
+
+/// The figures of a plan. In JSON the axes are in m and rad.
+pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
     let run = &plan.run;
-    let axis = |(k, (Axis { key, unit, .. }, motion)): (
-        usize,
-        (&Axis, &hallstage_input::stage::AxisMotion),
-    )| {
-        let [peak_speed, peak_acceleration] = run.peaks(k);
+    let axis = |k: usize| {
+        let ([peak_speed, peak_acceleration], motion) = (run.peaks(k), &stage.motion.axes[k]);
         json!({
-            "axis": key,
-            "unit": unit,
+            "axis": AXES[k].key,
+            "unit": AXES[k].unit,
             "amplitude": run.amplitudes[k],
             "service": motion.service,
             "frequency_hz": run.frequency_hz(k),
@@ -32,43 +37,40 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Value {
             "acceleration_limit": motion.acceleration,
         })
     };
-    let axes = AXES.iter().zip(&stage.motion.axes).enumerate().map(axis);
     let service = &plan.forecast.service;
-    let (ratios, floor) = (
-        service.ratios(),
-        service.noise.map(|variance| variance.sqrt() * 1e6),
-    );
-    let predicted = |k: usize, unit: &str| {
-        json!({
-            format!("rmse_{unit}"): ratios[k] * floor[k],
-            format!("floor_{unit}"): floor[k],
-            "ratio": ratios[k],
-        })
+    let (ratios, floor) = (service.ratios(), service.noise.map(f64::sqrt));
+    let predicted = |k: usize| {
+        let rmse = ratios[k] * floor[k];
+        group! { "rmse" => micro(&PLANAR[k], rmse), "floor" => micro(&PLANAR[k], floor[k]), "ratio" => ratios[k] }
     };
     let errors = plan.forecast.posterior.standard_errors();
-    let of_prior = |k: usize| TERMS[k % PER_PROBE].prior.map(|prior| errors[k] / prior);
     let parameter = |k: usize| {
         let unit = TERMS[k % PER_PROBE].unit;
-        let value = json!({ "standard_error": errors[k], "unit": unit, "of_prior": of_prior(k) });
-        (name(k), value)
+        let of_prior = over_prior(&errors, k);
+        (
+            name(k),
+            json!({ "standard_error": errors[k], "unit": unit, "of_prior": of_prior }),
+        )
     };
-    let mut worst: Vec<(f64, usize)> = (0..COUNT).filter_map(|k| Some((of_prior(k)?, k))).collect();
+    let mut worst: Vec<(f64, usize)> = (0..COUNT)
+        .filter_map(|k| Some((over_prior(&errors, k)?, k)))
+        .collect();
     worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let worst = worst.iter().take(NAMED).map(|&(_, k)| name(k));
-    json!({
-        "seconds": run.seconds,
-        "taper_s": run.taper_s,
-        "rows": run.rows(stage.servo_period_s),
-        "axes": axes.collect::<Vec<_>>(),
-        "service": { "x": predicted(0, "um"), "y": predicted(1, "um"), "rz": predicted(2, "urad") },
-        "parameters": (0..COUNT).map(parameter).collect::<Map<_, _>>(),
-        "least_determined": worst.collect::<Vec<_>>(),
-        "temperature": protocol.iter().map(of_log).collect::<Vec<_>>(),
-    })
+    let worst: Figure = worst.iter().take(NAMED).map(|&(_, k)| name(k)).collect();
+    group! {
+        "seconds" => bare(run.seconds, "s"),
+        "taper" => figure(run.taper_s, "s"),
+        "rows" => run.rows(stage.servo_period_s),
+        "axes" => json!((0..6).map(axis).collect::<Vec<_>>()),
+        "service" => by_axis(predicted),
+        "parameters" => Value::from((0..COUNT).map(parameter).collect::<Map<_, _>>()),
+        "least_determined" => worst,
+        "temperature" => json!(protocol.iter().map(warm_log).collect::<Vec<_>>()),
+    }
 }
 
-/// A log at a temperature, and what is expected of a fit of all up to it.
-fn of_log(log: &WarmLog) -> Value {
+/// A log at a temperature, and what is expected of a fit to all logs up to it.
+fn warm_log(log: &WarmLog) -> Value {
     let [k, h] = log.error_per_k;
     let at = |distance: usize| {
         let [x, y, rz] = log.ratios[distance];
@@ -92,10 +94,8 @@ pub fn steps(protocol: &[WarmLog]) -> String {
         return String::new();
     }
     let step = |log: &WarmLog| format!("  {}: {} s, {}\n", log.name, log.seconds, log.when);
-    let names: Vec<String> = protocol
-        .iter()
-        .map(|log| format!("{}.csv", log.name))
-        .collect();
+    let names = protocol.iter().map(|log| format!("{}.csv", log.name));
+    let names: Vec<String> = names.collect();
     format!(
         "logs for temperature, of runs by host-fit plan --seconds\n{}next: host-fit fit {}, with the columns of the sensors in [temperature] of stage.toml; at work zero \
          the stage again after every 5 K\n",
@@ -104,88 +104,89 @@ pub fn steps(protocol: &[WarmLog]) -> String {
     )
 }
 
-/// Errors in service over the noise floor, as expected after each log.
-fn of_protocol(figures: &Value) -> Option<Table> {
-    let titles = [
-        "k, %/K",
-        "h, %/K",
-        "X at 5 K",
-        "Y",
-        "Rz",
-        "X at 10 K",
-        "Y",
-        "Rz",
-    ];
-    let mut table = Table::new(
-        "temperature: standard errors, and errors in service over the noise",
-        &titles,
-    );
-    for log in figures["temperature"].as_array()? {
-        let of = |group: &str| {
-            ["x", "y", "rz"]
-                .map(|axis| format!("{:.2}", log[group][axis].as_f64().unwrap_or(f64::NAN)))
-        };
-        let error = |key: &str| match log[key].as_f64() {
-            Some(error) if error > 1e-8 => format!("{:.4}", error * 1e2),
-            _ => "-".to_owned(),
-        };
-        let errors = [error("error_of_k_per_k"), error("error_of_h_per_k")];
-        let ratios = [of("ratio_at_5_k"), of("ratio_at_10_k")].concat();
-        let name = log["log"].as_str().unwrap_or_default();
-        table.row(name, errors.into_iter().chain(ratios));
-    }
-    (!table.rows.is_empty()).then_some(table)
+/// A value with this many significant digits.
+fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits - 1);
+    text.parse().unwrap_or(value)
 }
 
-/// The tables of these figures: the run, errors predicted for service, standard errors.
-pub fn tables(figures: &Value) -> Vec<Table> {
-    let titles = [
-        "amplitude",
-        "in service",
-        "frequency, Hz",
-        "speed, per s",
-        "limit",
-        "acceleration, per s2",
-        "limit",
-        "unit",
-    ];
-    let mut motion = Table::new("motion", &titles);
-    for axis in figures["axes"].as_array().into_iter().flatten() {
-        let micro = |key: &str| format!("{:.1}", axis[key].as_f64().unwrap_or_default() * 1e6);
-        let unit = if axis["unit"] == "m" { "um" } else { "urad" };
-        motion.row(
-            axis["axis"].as_str().unwrap_or_default(),
-            [
-                micro("amplitude"),
-                micro("service"),
-                number(axis["frequency_hz"].as_f64().unwrap_or_default(), "Hz"),
-                micro("peak_speed"),
-                micro("speed_limit"),
-                micro("peak_acceleration"),
-                micro("acceleration_limit"),
-                unit.to_owned(),
-            ],
+/// Predicted errors in service over the noise floor, after each log of a protocol.
+fn temperature_table(protocol: &[WarmLog]) -> Table {
+    let mut table = Table::new(
+        "temperature: standard errors, and errors in service over the noise",
+        &[
+            "k, %/K",
+            "h, %/K",
+            "X at 5 K",
+            "Y",
+            "Rz",
+            "X at 10 K",
+            "Y",
+            "Rz",
+        ],
+    );
+    for log in protocol {
+        let error = |error: f64| match error > 1e-8 {
+            true => Figure::from(rounded(error * 1e2, 3)),
+            false => Figure::None,
+        };
+        let ratios = log
+            .ratios
+            .iter()
+            .flatten()
+            .map(|ratio| Figure::from(rounded(*ratio, 3)));
+        table.row(
+            log.name,
+            log.error_per_k.map(error).into_iter().chain(ratios),
         );
     }
-    let parameters = &figures["parameters"];
-    let errors = by_probe(
-        "standard errors predicted",
-        0..PER_PROBE,
-        &["", "of prior"],
-        |name, scale| {
-            let p = parameters.get(name)?;
-            let of_prior = p["of_prior"]
-                .as_f64()
-                .map_or("-".to_owned(), |x| format!("{x:.2}"));
-            Some(vec![
-                format!("{:.1e}", p["standard_error"].as_f64()? * scale),
-                of_prior,
-            ])
-        },
-    );
-    let mut all = super::table::tables(figures, &["axes", "parameters", "temperature"]);
+    table
+}
+
+/// The tables of a plan: the run, errors predicted for service, standard errors.
+pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
+    let run = &plan.run;
+    let mut motion = Table {
+        decimals: Some(1),
+        ..Table::new(
+            "motion",
+            &[
+                "amplitude",
+                "in service",
+                "frequency, Hz",
+                "speed, per s",
+                "limit",
+                "acceleration, per s2",
+                "limit",
+            ],
+        )
+    };
+    for (k, axis) in AXES.iter().enumerate() {
+        let (peaks, limits) = (run.peaks(k), &stage.motion.axes[k]);
+        let micro = |x: f64| micro(axis, x);
+        let figures = [
+            micro(run.amplitudes[k]),
+            micro(limits.service),
+            run.frequency_hz(k).into(),
+            micro(peaks[0]),
+            micro(limits.speed),
+            micro(peaks[1]),
+            micro(limits.acceleration),
+        ];
+        motion.row(axis.key, figures);
+    }
+    let standard_errors = plan.forecast.posterior.standard_errors();
+    let index = |parameter: &str| (0..COUNT).find(|k| name(*k) == parameter);
+    let title = "standard errors predicted";
+    let errors = by_probe(title, 0..PER_PROBE, &["", "of prior"], |name, unit| {
+        let k = index(name)?;
+        let of_prior = over_prior(&standard_errors, k);
+        let of_prior = of_prior.map_or(Figure::None, |x| rounded(x, 2).into());
+        Some(vec![bare(rounded(standard_errors[k], 2), unit), of_prior])
+    });
+    let mut all = figures(plan, protocol, stage).tables();
     all.splice(1..1, [motion]);
     all.push(errors);
-    all.extend(of_protocol(figures));
+    all.extend(Some(temperature_table(protocol)).filter(|table| !table.rows.is_empty()));
     all
 }

@@ -1,6 +1,7 @@
 //! Where the figures of a report come from: command, versions, inputs, seed.
 
-use super::table::{Table, file_name};
+use super::table::Table;
+use super::text::file_name;
 use hallstage_input::dataset::Dataset;
 use sha2::{Digest, Sha256};
 use std::ffi::{OsStr, OsString};
@@ -9,7 +10,7 @@ use std::path::Path;
 
 /// What somebody needs to make the same calibration again: a table of name, what it is, and for files
 /// their SHA-256.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance(pub Table);
 
 impl Provenance {
@@ -31,7 +32,7 @@ impl Provenance {
             "" => what,
             hash => format!("{what}, SHA-256 {hash}"),
         };
-        self.0.row(name, [what]);
+        self.0.row(name, [what.into()]);
     }
 
     /// Adds a file by its bytes; nothing where it cannot be read any more.
@@ -120,12 +121,10 @@ mod tests {
             "",
         ];
         let Provenance(table) = Provenance::new(words.into_iter().map(OsString::from));
+        let rows = table.cells().rows;
         assert_eq!(
-            table.rows[0],
-            [
-                "command",
-                r"host-fit fit 'my log.csv' --serial 'it'\''s' ''"
-            ]
+            rows[0][1],
+            r"host-fit fit 'my log.csv' --serial 'it'\''s' ''"
         );
     }
 
@@ -143,6 +142,6 @@ mod tests {
         let (rows, runs) = (sample.rows.len(), sample.movements.len());
         let want =
             format!("log, 57000 rows in 57 movements; {rows} of them, in {runs} runs, are drawn");
-        assert!(provenance.0.rows[0][1].starts_with(&want));
+        assert!(provenance.0.cells().rows[0][1].starts_with(&want));
     }
 }

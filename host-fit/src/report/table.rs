@@ -1,386 +1,283 @@
-//! A result as tables: of every figure its name, its value and its unit. The terminal and the pages
-//! show the same tables, and JSON has the same figures.
+//! Tables of figures. The terminal and the pages show the same tables.
 
-use hallstage_solver::problem::terms::shown;
-use serde::Serialize;
-use serde_json::{Map, Value};
-use std::borrow::Cow;
-use std::path::Path;
+use super::figure::{Figure, Group, Item};
+use super::text::words;
+use serde::{Serialize, Serializer};
 
-/// The units that end the name of a figure.
-const UNITS: [&str; 9] = ["um", "urad", "us", "ms", "s", "m", "rad", "hz", "percent"];
-
-/// Figures that have no unit where the others beside them have one.
-const BARE: [&str; 5] = ["sigma", "of_prior", "ratio", "correlation", "inflation"];
-
-/// A table. The first cell of a row names it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+/// A table of figures. The name of a row stands in its first column.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What it shows.
+    /// Its title.
     pub title: String,
-    /// Titles of the columns; none where every row is a name with its value and unit.
+    /// Titles of the columns, that of the names first. None in a list of names with their figures.
     pub columns: Vec<String>,
-    /// Rows of as many cells.
-    pub rows: Vec<Vec<String>>,
+    /// Name and figures of each row.
+    pub rows: Vec<(String, Vec<Figure>)>,
+    /// A remark for each row, which stands in the last column, or none at all.
+    pub remarks: Vec<String>,
+    /// Decimals of um and urad; three if not given.
+    pub decimals: Option<usize>,
+}
+
+/// A table as texts.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Cells {
+    pub(super) titles: Vec<String>,
+    /// Which columns hold texts, and so stand to the left.
+    pub(super) is_left: Vec<bool>,
+    pub(super) rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table with these columns after the one of the names.
+    /// A table with these columns after that of the names.
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
         let columns = [""].iter().chain(columns);
         Self {
             title: title.into(),
             columns: columns.map(|title| (*title).to_owned()).collect(),
-            rows: Vec::new(),
+            ..Self::default()
         }
     }
 
     /// Adds a row.
-    pub fn row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
-        self.rows
-            .push(std::iter::once(name.into()).chain(cells).collect());
+    pub fn row(&mut self, name: impl Into<String>, figures: impl IntoIterator<Item = Figure>) {
+        self.rows.push((name.into(), figures.into_iter().collect()));
     }
-}
 
-/// The tables of a result: its plain figures first, then one for each group of figures, in the order
-/// in which they stand. What is null, empty or `hidden` is left out.
-pub fn tables(result: &impl Serialize, hidden: &[&str]) -> Vec<Table> {
-    let Ok(Value::Object(fields)) = serde_json::to_value(result) else {
-        return Vec::new();
-    };
-    let mut tables = group("", &fields, hidden);
-    tables.retain(|table| !table.rows.is_empty());
-    tables
-}
-
-/// The tables of an object: one of its plain figures, one with a row for each object in it, and those of
-/// what holds objects or lists itself.
-fn group(title: &str, members: &Map<String, Value>, hidden: &[&str]) -> Vec<Table> {
-    let mut plain = Table {
-        title: words(title),
-        ..Table::default()
-    };
-    let mut rows = Vec::new();
-    let mut others = Vec::new();
-    for (key, value) in members
-        .iter()
-        .filter(|(key, _)| !hidden.contains(&key.as_str()))
-    {
-        let inner = format!("{title} {key}");
-        match value {
-            Value::Object(object) if title.is_empty() || object.values().any(Value::is_object) => {
-                others.extend(group(inner.trim(), object, &[]));
-            }
-            Value::Object(object) => {
-                let mut row = object.clone();
-                row.shift_insert(0, String::new(), Value::String(key.clone()));
-                rows.push(row);
-            }
-            Value::Array(items) if items.iter().any(Value::is_object) => {
-                others.push(list_of(
-                    inner.trim(),
-                    items.iter().filter_map(Value::as_object),
-                ));
-            }
-            Value::Array(items) if items.iter().any(Value::is_array) => {
-                let cells =
-                    |row: &Vec<Value>| row.iter().filter_map(|x| text_of(x, 1.0, "")).collect();
-                others.push(Table {
-                    title: words(inner.trim()),
-                    columns: Vec::new(),
-                    rows: items
-                        .iter()
-                        .filter_map(Value::as_array)
-                        .map(cells)
-                        .collect(),
-                });
-            }
-            value => plain
-                .rows
-                .extend(figure(key, value, "").map(|[name, text, unit]| {
-                    vec![name, format!("{text} {unit}").trim_end().to_owned()]
-                })),
-        }
+    /// A table with a row for each group. The first figure of a group is the name of its row.
+    pub fn from_groups(title: &str, groups: &[Group]) -> Self {
+        let rows = groups.iter().map(|group| {
+            let mut figures = group.flat();
+            let first = if figures.is_empty() {
+                (String::new(), Figure::None)
+            } else {
+                figures.remove(0)
+            };
+            (first.0, first.1.text(), figures)
+        });
+        Self::from_rows(title, rows.collect())
     }
-    // One beside plain figures has a title, not a name.
-    let rows = match &mut rows[..] {
-        [row] if !plain.rows.is_empty() && !title.is_empty() => {
-            let name = row.shift_remove("").unwrap_or_default();
-            let title = format!("{title} {}", name.as_str().unwrap_or_default());
-            list_of(&title, std::iter::once(&*row))
-        }
-        rows => list_of(title, rows.iter()),
-    };
-    let mut tables = vec![plain, rows];
-    tables.append(&mut others);
-    tables
-}
 
-/// A table with a row for each item.
-pub fn list(title: &str, items: &[impl Serialize]) -> Table {
-    let objects: Vec<_> = items
-        .iter()
-        .filter_map(|item| serde_json::to_value(item).ok())
-        .collect();
-    list_of(title, objects.iter().filter_map(Value::as_object))
-}
-
-/// A table with a row for each object, which its first text names. Units stand at the end of the rows
-/// where each row has one of its own, else in the titles of the columns.
-fn list_of<'m>(title: &str, objects: impl Iterator<Item = &'m Map<String, Value>>) -> Table {
-    let mut columns: Vec<[String; 2]> = Vec::new();
-    let mut rows: Vec<Vec<(usize, [String; 3])>> = Vec::new();
-    for object in objects {
-        let mut figures = Vec::new();
-        flatten("", object, &mut figures);
-        let mut row = Vec::new();
-        for figure in figures {
-            let place = columns.iter().position(|column| column[0] == figure[0]);
-            let place = place.unwrap_or_else(|| {
-                columns.push([figure[0].clone(), figure[2].clone()]);
-                columns.len() - 1
-            });
-            row.push((place, figure));
-        }
-        rows.push(row);
-    }
-    let unit_of = |row: &[(usize, [String; 3])]| {
-        let mut units = row.iter().map(|(_, figure)| figure[2].as_str());
-        let unit = units
-            .find(|unit| !unit.is_empty())
-            .unwrap_or_default()
-            .to_owned();
-        let others = row.iter().map(|(_, figure)| figure[2].as_str());
-        others
-            .into_iter()
-            .all(|other| other.is_empty() || other == unit)
-            .then_some(unit)
-    };
-    let of_rows: Option<Vec<String>> = rows.iter().map(|row| unit_of(row)).collect();
-    let of_rows = of_rows.filter(|units| units.iter().any(|unit| !unit.is_empty()));
-    let mut table = Table {
-        title: words(title),
-        columns: (columns.iter())
-            .map(|[name, unit]| match (&of_rows, unit.as_str()) {
-                (Some(_), _) | (_, "") => name.clone(),
-                (None, unit) => format!("{name}, {unit}"),
-            })
-            .collect(),
-        rows: Vec::new(),
-    };
-    if of_rows.is_some() {
-        table.columns.push("unit".to_owned());
-    }
-    for (k, row) in rows.into_iter().enumerate() {
-        let mut cells = vec!["-".to_owned(); columns.len()];
-        for (place, [_, text, _]) in row {
-            cells[place] = text;
-        }
-        cells.extend(of_rows.as_ref().map(|units| units[k].clone()));
-        table.rows.push(cells);
-    }
-    table
-}
-
-/// The figures of an object and of the objects in it: name, text and unit of each.
-fn flatten(before: &str, object: &Map<String, Value>, figures: &mut Vec<[String; 3]>) {
-    let unit = object
-        .get("unit")
-        .and_then(Value::as_str)
-        .unwrap_or_default();
-    for (key, value) in object.iter().filter(|(key, _)| *key != "unit") {
-        let name = format!("{before}{key}");
-        match value {
-            Value::Object(inner) => flatten(&format!("{name} "), inner, figures),
-            plain => {
-                let absent = || figure(&name, &Value::String(String::new()), unit);
-                figures.extend(figure(&name, plain, unit).or_else(absent));
+    /// Rows of head, name and figures by the titles of their columns.
+    fn from_rows(title: &str, rows: Vec<(String, String, Vec<(String, Figure)>)>) -> Self {
+        let head = rows
+            .first()
+            .map_or(String::new(), |(head, ..)| head.clone());
+        let mut columns = vec![head];
+        for (name, _) in rows.iter().flat_map(|(.., figures)| figures) {
+            if !columns[1..].contains(name) {
+                columns.push(name.clone());
             }
         }
-    }
-}
-
-/// Name, text and unit of a plain figure; `None` where there is none.
-fn figure(key: &str, value: &Value, unit: &str) -> Option<[String; 3]> {
-    let parts = |unit: &&'static str| Some((key.strip_suffix(*unit)?.strip_suffix('_')?, *unit));
-    let parts = UNITS.iter().find_map(parts);
-    let (name, suffix) = parts.map_or((key, None), |(name, unit)| (name, Some(unit)));
-    // Small lengths and angles read better in millionths.
-    let is_small = value.as_f64().is_some_and(|x| x.abs() < 0.01);
-    let (scale, unit) = match suffix {
-        Some("m") if is_small => (1e6, "um"),
-        Some("rad") if is_small => (1e6, "urad"),
-        Some(suffix) => (1.0, suffix),
-        None if BARE.contains(&key) => (1.0, ""),
-        None => shown(1.0, unit),
-    };
-    let text = text_of(value, scale, unit)?;
-    Some([words(name), text, unit.to_owned()])
-}
-
-fn text_of(value: &Value, scale: f64, unit: &str) -> Option<String> {
-    Some(match value {
-        Value::Null => return None,
-        Value::Object(members) => {
-            let unit = members
-                .get("unit")
-                .and_then(Value::as_str)
-                .unwrap_or_default();
-            let parts = members
-                .values()
-                .filter_map(|value| text_of(value, 1.0, unit));
-            parts.collect::<Vec<_>>().join(" ")
+        let row = |(_, name, figures): (String, String, Vec<(String, Figure)>)| {
+            let cell = |column: &String| {
+                let found = figures.iter().find(|(name, _)| name == column);
+                found.map_or(Figure::None, |(_, figure)| figure.clone())
+            };
+            (name, columns[1..].iter().map(cell).collect())
+        };
+        Self {
+            title: title.to_owned(),
+            rows: rows.into_iter().map(row).collect(),
+            columns,
+            ..Self::default()
         }
-        Value::Bool(is) => (if *is { "yes" } else { "no" }).to_owned(),
-        Value::String(text) if text.is_empty() => "-".to_owned(),
-        Value::String(text) => text.clone(),
-        Value::Number(n) if n.is_f64() => number(n.as_f64()? * scale, unit),
-        Value::Number(whole) => whole.to_string(),
-        Value::Array(items) => {
-            let between =
-                if items.iter().any(Value::is_string) && items.iter().any(Value::is_number) {
-                    " "
-                } else {
-                    ", "
+    }
+
+    /// The texts. Where each row has one unit, the units stand in a column at the end, else in the titles.
+    pub(super) fn cells(&self) -> Cells {
+        let text = |figure: &Figure| match (figure, self.decimals) {
+            (Figure::Number { value, unit, .. }, Some(decimals))
+                if value.is_finite() && matches!(unit.name, "um" | "urad") =>
+            {
+                format!("{value:.decimals$}")
+            }
+            _ => figure.text(),
+        };
+        if self.columns.is_empty() {
+            let line = |(name, figures): &(String, Vec<Figure>)| {
+                let cell = |figure: &Figure| {
+                    format!("{} {}", text(figure), figure.unit().name)
+                        .trim_end()
+                        .to_owned()
                 };
-            let items = items.iter().filter_map(|item| text_of(item, scale, unit));
-            let items: Vec<String> = items.collect();
-            (!items.is_empty()).then(|| items.join(between))?
+                std::iter::once(name.clone())
+                    .chain(figures.iter().map(cell))
+                    .collect()
+            };
+            let rows: Vec<Vec<String>> = self.rows.iter().map(line).collect();
+            let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+            return Cells {
+                titles: Vec::new(),
+                is_left: vec![true; columns],
+                rows,
+            };
         }
-    })
-}
-
-fn words(key: &str) -> String {
-    key.replace('_', " ")
-}
-
-/// A number in its unit: um, urad and us to a thousandth, others in six significant digits.
-pub fn number(x: f64, unit: &str) -> String {
-    let size = x.abs();
-    let decimals = match unit {
-        _ if x == 0.0 => return "0".to_owned(),
-        "um" | "urad" | "us" | "percent" if size >= 0.01 => return format!("{x:.3}"),
-        _ if !(1e-4..1e9).contains(&size) => return format!("{x:.3e}"),
-        _ => (5.0 - size.log10().floor()).clamp(0.0, 9.0) as usize,
-    };
-    let text = format!("{x:.decimals$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
-}
-
-/// A value with its standard error, in units of the last digits: -192.98(14).
-pub fn with_error(value: f64, error: Option<f64>) -> String {
-    match error.filter(|error| *error > 0.0) {
-        None => number(value, ""),
-        Some(error) => {
-            // Two digits of the standard error.
-            let decimals = (1.0 - error.log10().floor()).clamp(0.0, 12.0);
-            let digits = (error * 10f64.powf(decimals)).round();
-            let decimals = decimals as usize;
-            format!("{value:.decimals$}({digits:.0})")
-        }
-    }
-}
-
-/// Tables for a terminal.
-pub fn as_text(tables: &[Table]) -> String {
-    let mut out = String::new();
-    for table in tables {
-        if !out.is_empty() {
-            out.push('\n');
-        }
-        if !table.title.is_empty() {
-            out += &format!("{}\n", table.title);
-        }
-        let has_titles = table.columns.iter().any(|title| !title.is_empty());
-        let lines: Vec<&Vec<String>> = (has_titles.then_some(&table.columns).into_iter())
-            .chain(&table.rows)
+        let unit = |figures: &mut dyn Iterator<Item = &Figure>| -> Option<&'static str> {
+            let mut units = figures
+                .map(|figure| figure.unit().name)
+                .filter(|unit| !unit.is_empty());
+            let first = units.next().unwrap_or_default();
+            units.all(|unit| unit == first).then_some(first)
+        };
+        let of_rows: Option<Vec<&str>> = self
+            .rows
+            .iter()
+            .map(|(_, row)| unit(&mut row.iter()))
             .collect();
-        let columns = lines.iter().map(|cells| cells.len()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..columns)
-            .map(|k| {
-                let cells = lines.iter().filter_map(|cells| cells.get(k));
-                cells
-                    .map(|cell| plain(cell, "").chars().count())
-                    .max()
-                    .unwrap_or(0)
-            })
+        let of_rows = of_rows.filter(|units| units.iter().any(|unit| !unit.is_empty()));
+        let column = |k: usize| self.rows.iter().filter_map(move |(_, row)| row.get(k));
+        let titled = |(k, title): (usize, &String)| match k
+            .checked_sub(1)
+            .and_then(|k| unit(&mut column(k)))
+        {
+            Some(unit) if !unit.is_empty() && of_rows.is_none() => format!("{title}, {unit}"),
+            _ => title.clone(),
+        };
+        let mut titles: Vec<String> = self.columns.iter().enumerate().map(titled).collect();
+        let is_text =
+            |k: usize| column(k).any(|figure| matches!(figure, Figure::Text(_) | Figure::Is(_)));
+        let mut is_left: Vec<bool> = std::iter::once(true)
+            .chain((1..titles.len()).map(|k| is_text(k - 1)))
             .collect();
-        for cells in lines {
-            let mut line = String::from(" ");
-            for (k, cell) in cells.iter().enumerate() {
-                let (width, cell) = (widths[k], plain(cell, ""));
-                // Names and texts to the left, numbers to the right.
-                let is_number = |row: &Vec<String>| row.get(k).is_none_or(|cell| is_number(cell));
-                line += &match k > 0 && has_titles && table.rows.iter().all(is_number) {
-                    true => format!(" {cell:>width$} "),
-                    false => format!(" {cell:<width$} "),
-                };
+        let row = |(k, (name, figures)): (usize, &(String, Vec<Figure>))| {
+            let cells = std::iter::once(name.clone()).chain(figures.iter().map(text));
+            let unit = of_rows.as_ref().map(|units| units[k].to_owned());
+            cells
+                .chain(unit)
+                .chain(self.remarks.get(k).cloned())
+                .collect()
+        };
+        let rows = self.rows.iter().enumerate().map(row).collect();
+        let more = [
+            (of_rows.is_some(), "unit"),
+            (!self.remarks.is_empty(), "meaning"),
+        ];
+        for (_, title) in more.into_iter().filter(|(is_there, _)| *is_there) {
+            titles.push(title.to_owned());
+            is_left.push(true);
+        }
+        Cells {
+            titles,
+            is_left,
+            rows,
+        }
+    }
+}
+
+impl Serialize for Table {
+    /// Title and texts, for a page.
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        (&self.title, self.cells()).serialize(to)
+    }
+}
+
+impl Group {
+    /// Its tables: one of its plain figures, then one for each group of groups and each list in it.
+    pub fn tables(&self) -> Vec<Table> {
+        let mut tables = Vec::new();
+        self.add_tables("", &mut tables);
+        tables.retain(|table| !table.rows.is_empty());
+        tables
+    }
+
+    fn add_tables(&self, title: &str, all: &mut Vec<Table>) {
+        let (mut plain, mut rows, mut others) = (
+            Table {
+                title: title.to_owned(),
+                ..Table::default()
+            },
+            Vec::new(),
+            Vec::new(),
+        );
+        let has_figures = self
+            .0
+            .iter()
+            .any(|(_, item)| matches!(item, Item::Figure(_)));
+        for (name, item) in &self.0 {
+            let name = words(name);
+            let inner = format!("{title} {name}").trim().to_owned();
+            match item {
+                Item::Hidden(_) | Item::Figure(Figure::None) => {}
+                Item::Figure(Figure::List(matrix))
+                    if matches!(matrix[..], [Figure::List(_), ..]) =>
+                {
+                    let row = |row: &Figure| (row.readable(false).text(), Vec::new());
+                    let rows = matrix.iter().map(row).collect();
+                    others.push(Table {
+                        title: inner,
+                        rows,
+                        ..Table::default()
+                    });
+                }
+                Item::Figure(figure) => plain.row(name, [figure.readable(true)]),
+                Item::Group(group) if title.is_empty() || has_figures || group.has_groups() => {
+                    group.add_tables(&inner, &mut others);
+                }
+                Item::Group(group) => rows.push((String::new(), name, group.flat())),
+                Item::List(groups) => others.push(Table::from_groups(&inner, groups)),
             }
-            out += line.trim_end();
-            out.push('\n');
         }
+        all.push(plain);
+        all.push(Table::from_rows(title, rows));
+        all.append(&mut others);
     }
-    out
-}
-
-/// Text with its control characters escaped, those of `kept` excepted, and those that reorder what
-/// stands beside them: a name, cell or serial number of a file shows as it is and forges no line.
-pub fn plain<'t>(text: &'t str, kept: &str) -> Cow<'t, str> {
-    let harmful = |c: char| {
-        let moves = c.is_control()
-            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
-        moves && !kept.contains(c)
-    };
-    if !text.contains(harmful) {
-        return Cow::Borrowed(text);
-    }
-    let mut plain = String::with_capacity(text.len());
-    for c in text.chars() {
-        match harmful(c) {
-            true => plain.extend(c.escape_default()),
-            false => plain.push(c),
-        }
-    }
-    Cow::Owned(plain)
-}
-
-/// Text with the signs of micrometres, microradians and microseconds where these units follow a number or
-/// a comma, or stand alone.
-pub fn with_signs(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut before = "";
-    for word in text.split_inclusive([' ', '\n', '/', ',', ';', ':', ')', '(']) {
-        let bare = word.trim_end_matches([' ', '\n', '/', ',', ';', ':', ')', '.']);
-        let follows = before.ends_with([',', '(', '/'])
-            || before.ends_with(|c: char| c.is_ascii_digit())
-            || before.is_empty();
-        match bare {
-            "um" | "urad" | "us" if follows => {
-                out.push('µ');
-                out.push_str(&word[1..]);
-            }
-            _ => out.push_str(word),
-        }
-        before = word.trim_end_matches([' ', '\n']);
-    }
-    out
-}
-
-/// The name of a file without its folder.
-pub fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
-}
-
-/// Whether a cell is a number, or stands for one.
-fn is_number(cell: &str) -> bool {
-    let number = cell.split_once('(').map_or(cell, |(number, _)| number);
-    matches!(cell, "" | "-") || number.parse::<f64>().is_ok()
 }
 
 #[cfg(test)]
-#[path = "table_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::report::figure::{bare, figure, group};
+    use crate::report::text::as_text;
+    use serde_json::json;
+
+    fn result() -> Group {
+        let axis = |unit, rmse, peak| group! { "rmse" => figure(rmse, unit), "peak" => figure(peak, unit) };
+        group! {
+            "rows" => 3,
+            "elapsed" => figure(1.25, "s"),
+            "absent" => Figure::None,
+            "secret" => json!(7),
+            "fitness" => bare(1.5, "um"),
+            "errors" => group! { "x" => axis("um", 1.0, 20.5), "rz" => axis("urad", 0.25, 0.5) },
+            "lag" => figure(-3.0, "us").with_error(Some(0.5)),
+            "logs" => vec![group! { "path" => "a.csv", "errors" => group! {
+                "x" => group! { "rmse" => figure(2.0, "um") }, "rz" => group! { "rmse" => figure(3.0, "urad") },
+            } }],
+        }
+    }
+
+    #[test]
+    fn a_result_is_shown_by_name_value_and_unit() {
+        let want = [
+            "  rows     3",
+            "  elapsed  1.25 s",
+            "  fitness  1.500 um",
+            "  lag      -3.00(50) us",
+            "",
+            "errors",
+            "       rmse    peak  unit",
+            "  x   1.000  20.500  um",
+            "  rz  0.250   0.500  urad",
+            "",
+            "logs",
+            "  path   errors x rmse, um  errors rz rmse, urad",
+            "  a.csv              2.000                 3.000",
+            "",
+        ];
+        assert_eq!(as_text(&result().tables()), want.join("\n"));
+    }
+
+    #[test]
+    fn the_keys_of_json_end_with_the_unit() {
+        let want = json!({
+            "rows": 3, "elapsed_s": 1.25, "absent": null, "secret": 7, "fitness": 1.5,
+            "errors": {
+                "x": { "rmse_um": 1.0, "peak_um": 20.5 }, "rz": { "rmse_urad": 0.25, "peak_urad": 0.5 },
+            },
+            "lag_us": -3.0, "standard_error_us": 0.5,
+            "logs": [{ "path": "a.csv", "errors": { "x": { "rmse_um": 2.0 }, "rz": { "rmse_urad": 3.0 } } }],
+        });
+        assert_eq!(serde_json::to_value(result()).expect("JSON"), want);
+    }
+}

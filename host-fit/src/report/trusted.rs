@@ -1,19 +1,18 @@
-//! The inputs that are trusted: an error in one of them leaves the residuals of a fit as they are, so no
-//! log shows it.
+//! The trusted inputs: an error in one of them leaves the residuals of a fit as they are, so no log shows it.
 //!
-//! The fit turns the Hall signals into the pose that the reference shows. A scale of the reference that
-//! is wrong becomes a scale of the pose. Scales and places on the side of the sensors are taken up
-//! by fitted parameters: eta by that of the Hall codes, the lever arms by the coordinates of the
-//! probes, the vertical terms by that of the gaps, which remain wrong in Z, Rx and Ry alone.
+//! The fit turns the Hall signals into the pose of the reference. A wrong scale of the reference becomes a wrong scale of
+//! the pose. Fitted parameters absorb wrong scales and places of the sensors: eta the scale of the Hall codes, the lever
+//! arms the coordinates of the probes, the vertical terms the scale of the gaps, which stays wrong in Z, Rx and Ry alone.
 
+use super::figure::{Group, bare, group};
+use hallstage_input::axis::AXES;
 use runtime::ParameterSet;
-use serde_json::{Value, json};
+use serde_json::json;
 
-/// An error of this part of an input.
+/// The relative error of an input.
 const PART: f64 = 0.01;
 
-/// The axes, and of each input where it is said and what it scales.
-const AXES: [&str; 6] = ["X", "Y", "Rz", "Z", "Rx", "Ry"];
+/// The inputs: what each is, where the user gives it, and the axes that it scales.
 const INPUTS: [(&str, &str, &[usize]); 4] = [
     (
         "scale of the interferometers",
@@ -37,23 +36,17 @@ const INPUTS: [(&str, &str, &[usize]); 4] = [
     ),
 ];
 
-/// Every trusted input of a calibration, and what an error of 1 % of it costs: the error of the pose by axis
-/// at the ends of the calibrated range, in um or urad.
-pub fn trusted(set: &ParameterSet) -> Value {
+/// Each trusted input of a calibration, and the cost of an error of 1 % in it: the error of the pose by axis at the ends of
+/// the calibrated range.
+pub fn trusted(set: &ParameterSet) -> Vec<Group> {
     let constants = &set.constants;
     let ends = [constants.calibrated_planar, constants.calibrated_vertical].concat();
     let cost = |&axis: &usize| {
-        let unit = if AXES[axis].starts_with('R') {
-            "urad"
-        } else {
-            "um"
-        };
-        let value = PART * f64::from(ends[axis]) * 1e6;
-        json!({ "axis": AXES[axis], "value": value, "unit": unit })
+        let (value, unit) = (PART * f64::from(ends[axis]) * 1e6, AXES[axis].micro);
+        group! { "axis" => AXES[axis].name, "value" => bare(value, unit), "unit" => json!(unit) }
     };
-    let of_input = |(input, place, axes): (_, _, &[usize])| {
-        let cost: Vec<Value> = axes.iter().map(cost).collect();
-        json!({ "input": input, "place": place, "cost": cost })
+    let input = |(input, place, axes): (&str, &str, &[usize])| {
+        group! { "input" => input, "place" => place, "cost" => axes.iter().map(cost).collect::<Vec<_>>() }
     };
-    INPUTS.map(of_input).into_iter().collect()
+    INPUTS.map(input).into()
 }

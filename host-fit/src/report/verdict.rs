@@ -1,10 +1,13 @@
 //! What a person reads first: whether the calibration can be used, its errors by axis, what to do next.
 
-use super::table::{Table, as_text};
+use super::figure::{Figure, micro};
+use super::table::Table;
+use super::text::as_text;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::judge::predicted::{Predicted, Validity};
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
+use hallstage_input::axis::PLANAR;
 use hallstage_input::finding::Severity;
 use serde::Serialize;
 
@@ -41,7 +44,7 @@ pub struct Subject<'a> {
 }
 
 /// Verdict, errors by axis, and what to do.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// How the page marks it: `good`, `limited` or `refused`.
     pub mark: &'static str,
@@ -143,47 +146,39 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
 /// rms over all rows, noise, what is predicted for service, expanded uncertainty, limit. The uncertainty is
 /// that in service if it is predicted, else that on the log; k = 2 covers 95 % of normal errors.
 fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
-    let titles = [
+    if of.errors.is_none() && predicted.is_none() {
+        return Table::default();
+    }
+    let columns = [
         "rms on the log",
         "noise",
         "rms in service",
         "uncertainty, k = 2",
         "limit",
         "pass",
-        "unit",
     ];
-    let mut table = Table::new("", &titles);
-    if of.errors.is_none() && predicted.is_none() {
-        return Table::default();
-    }
-    for (axis, (name, unit)) in [("X", "um"), ("Y", "um"), ("Rz", "urad")]
-        .into_iter()
-        .enumerate()
-    {
-        let rms = of.errors.map(|errors| errors.axes[axis].rms);
-        let service = predicted.map(|predicted| predicted.rms[axis]);
-        let noise = predicted.map(|predicted| predicted.rms[axis] / predicted.ratio[axis]);
+    let mut table = Table {
+        decimals: Some(2),
+        ..Table::new("", &columns)
+    };
+    for (k, axis) in PLANAR.iter().enumerate() {
+        let rms = of.errors.map(|errors| errors.axes[k].rms);
+        let service = predicted.map(|predicted| predicted.rms[k]);
+        let noise = predicted.map(|predicted| predicted.rms[k] / predicted.ratio[k]);
         let own = noise
             .filter(|_| of.is_field)
             .map(|noise| LIMITED_MAX * noise);
         // What follows from the noise holds in service.
-        let (limit, measured) = match of.limits[axis] {
+        let (limit, measured) = match of.limits[k] {
             Some(limit) if !of.in_service => (Some(limit), rms),
             limit => (limit.or(own), service),
         };
         let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
-        let micro = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", x * 1e6));
         let uncertainty = service.or(rms).map(|rms| 2.0 * rms);
-        let pass = match passes {
-            None => "-",
-            Some(true) => "yes",
-            Some(false) => "no",
-        };
-        let cells = [rms, noise, service, uncertainty, limit].map(micro);
-        table.row(
-            name,
-            cells.into_iter().chain([pass, unit].map(str::to_owned)),
-        );
+        let errors = [rms, noise, service, uncertainty, limit];
+        let figures = errors.map(|error| error.map_or(Figure::None, |error| micro(axis, error)));
+        let pass = passes.map_or(Figure::None, Figure::Is);
+        table.row(axis.name, figures.into_iter().chain([pass]));
     }
     table
 }

@@ -97,23 +97,6 @@ impl Log<'_> {
         )
     }
 
-    /// What the log holds.
-    pub(super) fn signals(&self) -> Vec<Chart> {
-        let captions = [
-            "Displacements by the interferometers",
-            "Hall signals at the designed scale",
-            "Vertical pose by the capacitive sensors",
-        ];
-        let chart = |(caption, quantities): (&str, &[Quantity; 3])| {
-            let labels = quantities.map(|(name, _)| name);
-            self.over_time(caption, labels, &[Tone::Data], |_, row, k| {
-                Some(quantities[k].1(&self.dataset.rows[row]))
-            })
-        };
-        let (threes, _) = QUANTITIES.as_chunks();
-        captions.into_iter().zip(threes).map(chart).collect()
-    }
-
     /// Errors over time (m, m, rad) on one scale, those before behind those after.
     pub(super) fn errors(
         &self,

@@ -1,0 +1,307 @@
+//! The report of a fit, or of a blob that was judged: made once, shown as JSON, as tables and as a page.
+
+use super::errors::{RowErrors, by_log, by_temperature, errors};
+use super::field;
+use super::figure::{Group, Item, bare, figure, group};
+use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
+use super::trusted::trusted;
+use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::fit::Fit;
+use hallstage_calibration::judge::statistics::PoseError;
+use hallstage_calibration::judge::{Judgement, Zeros};
+use hallstage_calibration::words;
+use hallstage_input::axis::PROBES;
+use hallstage_input::dataset::{Dataset, Movement};
+use hallstage_input::finding::Finding;
+use hallstage_input::log::LogReading;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
+use runtime::ParameterSet;
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// How well a blob describes logs, and what a fit says besides.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The blob.
+    pub set: ParameterSet,
+    /// All figures.
+    pub figures: Group,
+    /// The parameters by name.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Setting, errors and zero deviation of each movement that was judged.
+    pub movements: Vec<Group>,
+    /// Errors over the judged rows; zero deviations refitted unless `delta` says zero.
+    pub errors: PoseError,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// What a diagnosis of the log found, by severity.
+    pub findings: Vec<Finding>,
+    /// Errors of the rows of the dataset, zero deviations taken off.
+    pub by_row: RowErrors,
+    /// Errors over these rows.
+    pub over_rows: PoseError,
+}
+
+impl Serialize for Report {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.figures.serialize(to)
+    }
+}
+
+/// What a command knows besides the fit or judgement itself.
+#[derive(Clone, Debug)]
+pub struct Circumstances<'a> {
+    /// The stage.
+    pub stage: &'a Stage,
+    /// The rows.
+    pub dataset: &'a Dataset,
+    /// Rows skipped as bad.
+    pub skipped_rows: usize,
+    /// Time so far, s.
+    pub elapsed_s: f64,
+    /// Warnings from reading.
+    pub warnings: Vec<String>,
+    /// What a diagnosis of the log found.
+    pub diagnosis: Diagnosis,
+}
+
+impl<'a> Circumstances<'a> {
+    /// A log that was read and diagnosed, and the time since the start.
+    pub fn new(
+        log: &'a LogReading,
+        stage: &'a Stage,
+        elapsed_s: f64,
+        diagnosis: Diagnosis,
+    ) -> Self {
+        Self {
+            stage,
+            dataset: &log.dataset,
+            skipped_rows: log.skipped_rows,
+            elapsed_s,
+            warnings: words::messages(&log.warnings),
+            diagnosis,
+        }
+    }
+}
+
+/// How a fit was made.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// How much was projected out.
+    pub project: &'static str,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// A blob judged on logs.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged<'a> {
+    /// The blob.
+    pub set: &'a ParameterSet,
+    /// Over all rows that were judged.
+    pub judgement: &'a Judgement,
+    /// How zero deviations were treated.
+    pub zeros: Zeros<'static>,
+    /// Errors of the rows of the dataset, zero deviations taken off.
+    pub by_row: &'a RowErrors,
+    /// Errors over these rows.
+    pub over_rows: PoseError,
+}
+
+/// Members of a fit that programs may look up in any report; null in a judgement.
+const FIT_ONLY: [&str; 6] = [
+    "model_reason",
+    "solver",
+    "project",
+    "seed",
+    "evaluations",
+    "errors_solver_delta",
+];
+
+impl Report {
+    /// The report of a blob that was judged.
+    ///
+    /// | key | what |
+    /// |---|---|
+    /// | `model` | equation of the model: "12", "15", "30" or "31"; "field" for the field model |
+    /// | `rows`, `movements`, `skipped_rows` | of the logs named; rows that were skipped as bad |
+    /// | `judged_rows`, `train_rows` | rows that the errors are over, in a fit to a long log its sample; rows that the fit used |
+    /// | `elapsed_s` | time of the whole command, log reading included |
+    /// | `train_fitness` | fitness over the rows that the fit used, with the solver's own zero deviations; for `eval` over the judged rows |
+    /// | `errors`, `delta` | over the judged rows; how zero deviations were treated: "fit" or "zero" |
+    /// | `parameters` | by name; of the field model all 81 |
+    /// | `coordinates` | H1x .. H3y nearest to the designed ones |
+    /// | `excerpt` | rows of a long log that fit, diagnosis and figures use, and their runs of successive rows; null for all rows |
+    /// | `zero_deviations` | of each movement that was judged |
+    /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
+    /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
+    /// | `trusted_inputs` | the inputs whose errors no log shows, with the cost of 1 % |
+    pub fn from_judgement(judged: Judged, c: &Circumstances) -> Self {
+        let Judged {
+            set,
+            judgement,
+            zeros,
+            by_row,
+            over_rows,
+        } = judged;
+        let (rows, movements) = c.dataset.read();
+        let (used, runs) = (c.dataset.rows.len(), c.dataset.movements.len());
+        let excerpt = (used < rows).then(|| group! { "rows" => used, "runs" => runs });
+        let parameters = parameters_in(set);
+        let zero_deviations = zero_deviations(c.dataset, judgement);
+        let places_m = Parameters::of_set(set).nearest_places_m(c.stage);
+        let mut figures = group! {
+            "model" => Model::of(set.model).name,
+            "rows" => rows,
+            "judged_rows" => judgement.rows(),
+            "train_rows" => set.fit.train_rows,
+            "movements" => movements,
+            "skipped_rows" => c.skipped_rows,
+            "elapsed_s" => json!(c.elapsed_s),
+            "train_fitness" => bare(judgement.errors.fitness(), "um"),
+            "errors" => errors(&judgement.errors),
+            "delta" => zeros.name(),
+            "parameters" => json!(parameters),
+            "coordinates" => json!(coordinates(places_m)),
+            "serial" => set.serial.as_str(),
+            "excerpt" => excerpt,
+            "zero_deviations" => json!(zero_deviations),
+            "warnings" => json!(c.warnings),
+            "verdict" => json!(c.diagnosis.verdict),
+            "predicted" => json!(c.diagnosis.predicted),
+            "valid_within_k" => json!(c.diagnosis.validity.map(|validity| validity.within_k)),
+            "temperatures" => several(by_temperature(c.dataset, by_row)),
+            "findings" => json!(words::worded(&c.diagnosis.findings)),
+            "logs" => several(by_log(c.dataset, judgement)),
+            "trusted_inputs" => trusted(set),
+        };
+        FIT_ONLY
+            .iter()
+            .for_each(|name| figures.set(name, Value::Null));
+        Self {
+            set: set.clone(),
+            figures,
+            parameters,
+            movements: zero_deviations,
+            errors: judgement.errors,
+            warnings: c.warnings.clone(),
+            findings: c.diagnosis.findings.clone(),
+            by_row: by_row.clone(),
+            over_rows,
+        }
+    }
+
+    /// The report of a fit. Only a fit has:
+    ///
+    /// | key | what |
+    /// |---|---|
+    /// | `model_reason`, `solver`, `project`, `seed` | why this model, and how it was fitted |
+    /// | `evaluations`, `solver_s`, `stopped` | evaluations of the cost, time of the solver alone, why it stopped |
+    /// | `loss`, `outlier_rows` | the loss that weights the rows; rows of the sample that count less than half |
+    /// | `standard_errors` | what the standard errors of the parameters include |
+    /// | `correlations` | pairs of parameters with a correlation above 0.95 or below -0.95 |
+    /// | `errors_solver_delta` | errors with the solver's own zero deviations |
+    /// | `field` | figures of a fit of the field model; null for other models |
+    /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
+    pub fn from_fit(fit: &Fit, choice: &Choice, c: &Circumstances) -> Self {
+        let by_row = fit.decoded.errors_less(&fit.judgement.zeros, c.dataset);
+        let mut report = Self::from_judgement(
+            Judged {
+                set: &fit.set,
+                judgement: &fit.judgement,
+                zeros: Zeros::of_model(fit.model),
+                by_row: &by_row,
+                over_rows: fit.judgement.errors,
+            },
+            c,
+        );
+        let (parameters, standard_errors) = match &fit.field {
+            Some(field) => (
+                field_parameters(
+                    &field.parameters.probes,
+                    Some(&field.posterior.standard_errors()),
+                ),
+                "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior",
+            ),
+            None => (
+                parameters(fit.model, &fit.solution.parameters, &fit.standard_error),
+                "sandwich over movements, or blocks of 0.5 s where there are fewer than 20; it includes drift, not what the model lacks",
+            ),
+        };
+        report.parameters = parameters;
+        report.warnings.extend(words::messages(&fit.warnings));
+        let places_m = fit.solution.parameters.nearest_places_m(c.stage);
+        let lag = fit.lag.map(|lag| {
+            let value = figure(lag.value_s * 1e6, "us");
+            group! {
+                "value" => value.with_error(Some(lag.standard_error_s * 1e6)),
+                "compensated" => fit.later.is_some(),
+            }
+        });
+        let correlations: Vec<Group> = fit.correlations.iter().map(field::correlation).collect();
+        let own = group! {
+            "train_fitness" => bare(fit.train_fitness, "um"),
+            "parameters" => json!(report.parameters),
+            "coordinates" => json!(coordinates(places_m)),
+            "warnings" => json!(report.warnings),
+            "model_reason" => fit.model_reason.as_str(),
+            "solver" => choice.solver,
+            "project" => choice.project,
+            "seed" => choice.seed,
+            "evaluations" => fit.solution.evaluations,
+            "solver_s" => json!(fit.solution.elapsed.as_secs_f64()),
+            "stopped" => fit.solution.stopped.as_str(),
+            "loss" => fit.loss.name(),
+            "outlier_rows" => fit.left_out.rows,
+            "standard_errors" => standard_errors,
+            "correlations" => correlations,
+            "errors_solver_delta" => errors(&fit.errors_solver_zeros),
+            "field" => fit.field.as_ref().map(field::figures),
+            "reference_lag" => lag,
+        };
+        own.0
+            .into_iter()
+            .for_each(|(name, item)| report.figures.set(&name, item));
+        report
+    }
+}
+
+/// A list that is shown only where it has several rows.
+fn several(groups: Vec<Group>) -> Item {
+    match groups.len() {
+        0 | 1 => json!(groups).into(),
+        _ => groups.into(),
+    }
+}
+
+/// Name, setting, errors and zero deviation of each movement that was judged.
+fn zero_deviations(dataset: &Dataset, judgement: &Judgement) -> Vec<Group> {
+    let movement = |(k, movement): (usize, &Movement)| {
+        let zero = &judgement.zeros[k];
+        let [z, rx, ry] = judgement.settings[k].map(|x| x * 1e6);
+        let mut group = group! {
+            "movement" => dataset.movement_name(movement),
+            "rows" => movement.rows.len(),
+            "z" => figure(z, "um"),
+            "rx" => figure(rx, "urad"),
+            "ry" => figure(ry, "urad"),
+            "errors" => errors(&judgement.by_movement[k]),
+        };
+        for (probe, delta_m) in PROBES.iter().zip(zero.delta_m) {
+            group.set(&probe.to_lowercase(), figure(delta_m * 1e6, "um"));
+        }
+        group.set("is_beyond", zero.is_beyond);
+        group
+    };
+    judgement
+        .movements
+        .iter()
+        .enumerate()
+        .map(movement)
+        .collect()
+}
