@@ -8,7 +8,7 @@
 mod common;
 
 use common::{Coverage, Fallible, RUN_8, RUN_30, Twin};
-use host_fit::calibration::plan::run::Run as PlannedRun;
+use host_fit::calibration::plan::run::PlannedRun;
 use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;

@@ -32,7 +32,7 @@ fn main() -> Fallible<()> {
         let log = twin.record(Run::planned(trajectory.clone()));
         let log = log.dataset(&stage).ok_or("no plane")?;
         let service = twin.record(Protocol::Service.run(stage.servo_period_s, seed));
-        let service = service.dataset_of_truth(&stage).ok_or("no plane")?;
+        let service = service.dataset_with_truth(&stage).ok_or("no plane")?;
         let [found, floor] = [
             fitted(&log, &stage, ModelKind::Field)?,
             fitted(&service, &stage, ModelKind::Field)?,

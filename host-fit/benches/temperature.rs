@@ -10,7 +10,7 @@ use common::{Axes, Coverage, Fallible, RUN_8, RUN_30, Twin, fitted};
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::judge::Decoded;
 use host_fit::calibration::judge::statistics::over_noise;
-use host_fit::calibration::plan::run::Run as PlannedRun;
+use host_fit::calibration::plan::run::PlannedRun;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped;
@@ -57,7 +57,7 @@ impl Twin<'_> {
     }
 
     fn judge(&self, fit: &Fit, recording: &Recording) -> Fallible<Axes> {
-        let truth = recording.dataset_of_truth(self.stage).ok_or("no plane")?;
+        let truth = recording.dataset_with_truth(self.stage).ok_or("no plane")?;
         Ok(ratios(fit, &truth))
     }
 

@@ -3,7 +3,7 @@
 
 use host_fit::calibration::fit::{Fit, FitSettings, ModelChoice, fit};
 use host_fit::calibration::judge::{Decoded, Zeros};
-use host_fit::calibration::plan::run::Run as PlannedRun;
+use host_fit::calibration::plan::run::PlannedRun;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::{ReadOptions, read_bytes};
 use host_fit::input::stage::Stage;

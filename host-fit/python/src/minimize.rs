@@ -18,7 +18,7 @@ struct Function<'a> {
     bounds: Vec<Range>,
     fun: &'a Py<PyAny>,
     vectorized: bool,
-    /// What it raised; from then on it is not called.
+    /// The exception that it raised; it is not called again.
     error: Mutex<Option<PyErr>>,
     failed: AtomicBool,
 }
@@ -60,7 +60,7 @@ impl Function<'_> {
         Ok(())
     }
 
-    /// Whether it gave what it should; if not, that is kept, and the search ends.
+    /// Keeps the first error and ends the search.
     fn keep(&self, done: PyResult<()>) {
         if let Err(error) = done {
             self.failed.store(true, Ordering::Relaxed);
@@ -71,7 +71,7 @@ impl Function<'_> {
     }
 }
 
-/// The error for something else than was expected.
+/// The error for a value of a wrong type or shape.
 fn not_what(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
     let shape = value
         .getattr("shape")
@@ -135,7 +135,7 @@ impl CostFunction for Function<'_> {
 /// maxiter : int
 ///     Generations after the first population. TLBO and its relatives evaluate every individual twice in one.
 /// maxfev : int, optional
-///     Ends the search after the generation in which so many places were evaluated.
+///     Most evaluations. The search ends after the generation that reaches this number.
 /// x0 : array_like, shape (N,), optional
 ///     A first individual; all others are drawn from the box.
 /// vectorized : bool

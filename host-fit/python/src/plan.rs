@@ -24,7 +24,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A run of the stage for the field model, and what a fit to its log will give. Made by `plan`.
+/// A run of the stage for the field model, and the forecast of a fit to its log. Made by `plan`.
 #[pyclass(frozen, module = "hallstage")]
 pub struct Plan {
     plan: plan::Plan,
@@ -32,7 +32,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// As it is read from a file: to 10 pm and prad.
+    /// The trajectory as a file, to 10 pm and prad.
     fn csv(&self) -> String {
         let period_s = self.designed.servo_period_s;
         plan_file::to_csv(&self.plan.run.trajectory(period_s), period_s)
@@ -91,7 +91,7 @@ pub fn plan_run(py: Python<'_>, stage: PyRef<'_, Stage>, seconds: f64) -> PyResu
     Ok(Plan { plan, designed })
 }
 
-/// The log of a simulated stage, and where it truly was. Made by `simulate`.
+/// The log of a simulated stage, and its true poses. Made by `simulate`.
 #[pyclass(frozen, extends = Log, module = "hallstage")]
 pub struct SimulatedLog {
     /// The true poses, a row for each row that was recorded: float64, (n, 6), X, Y, Rz, Z, Rx, Ry in m and rad.
@@ -99,14 +99,14 @@ pub struct SimulatedLog {
     truth: Py<PyArray2<f64>>,
 }
 
-/// Records a run of a simulated stage: magnets and their fields, rigid motion, noise, drift, converters; nothing
-/// of the models that are fitted.
+/// Records a run of a simulated stage: magnets and their fields, rigid motion, noise, drift, converters. The
+/// simulation uses none of the models that are fitted.
 ///
 /// `run`: a `Plan`; "paper", "combined", "service" or "day", the protocols of the program; or poses, (n, 6), X, Y, Rz,
-/// Z, Rx, Ry in m and rad, one for each servo period. `seed`: which stage, and its noise: an even one has magnets
-/// as designed, an odd one imperfect magnets. `hour`: begins the run at this hour of a working day, -24 to 24
-/// (work begins at 0), and the stage follows the temperatures of the day; `[temperature]` of the stage names
-/// their columns. The log is that of `host-fit simulate`, to the bit.
+/// Z, Rx, Ry in m and rad, one for each servo period. `seed`: stage and noise; an even seed has magnets
+/// as designed, an odd seed imperfect magnets. `hour`: begins the run at this hour of a working day, -24 to 24
+/// (work begins at 0); the log then has the temperature columns of `[temperature]` in the stage file. `host-fit
+/// simulate` gives the same log to the bit.
 ///
 /// Raises `ValueError` where a probe would hit its magnet, and for an `hour` of a stage without `[temperature]`.
 #[pyfunction]
@@ -119,7 +119,7 @@ pub fn simulate<'py>(
     hour: Option<f64>,
 ) -> PyResult<Bound<'py, SimulatedLog>> {
     let designed = Arc::clone(&stage.get().designed);
-    let run = run_of(run, designed.servo_period_s, seed)?;
+    let run = read_run(run, designed.servo_period_s, seed)?;
     if hour.is_some_and(|hour| !(-24.0..=24.0).contains(&hour)) {
         return Err(wrong("hour", "-24 to 24 h of the day are possible"));
     }
@@ -152,8 +152,8 @@ fn read_seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {
     whole("seed", given, 0, u64::MAX)
 }
 
-/// What is run. Poses are rounded as in a file, so that the noise, which follows from them, is the same, too.
-fn run_of(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
+/// The run to simulate. Poses are rounded as in a file, since the noise follows from the poses.
+fn read_run(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
     if let Ok(name) = run.extract::<String>() {
         return Ok(chosen::<Protocol>("run", &name)?.run(period_s, seed));
     }
@@ -162,7 +162,7 @@ fn run_of(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
         Err(_) => plan_file::to_csv(&given_poses(run)?, period_s),
     };
     let text = TextReader::from_reader(csv.as_bytes(), Path::new("run")).map_err(internal)?;
-    let trajectory = plan_file::of_text(text, period_s).map_err(|error| wrong("run", error))?;
+    let trajectory = plan_file::from_text(text, period_s).map_err(|error| wrong("run", error))?;
     Ok(Run::planned(trajectory))
 }
 
@@ -173,16 +173,11 @@ fn given_poses(run: &Bound<'_, PyAny>) -> PyResult<Trajectory> {
     if !rows.as_flattened().iter().all(|x| x.is_finite()) {
         return Err(wrong("run", "its poses must be finite numbers"));
     }
-    let pose = |&[x, y, rz, z, rx, ry]: &[f64; 6]| StagePose {
-        planar: [x, y, rz],
-        vertical: [z, rx, ry],
-    };
-    Ok(rows.iter().map(pose).collect())
+    Ok(rows.iter().copied().map(StagePose::from_array).collect())
 }
 
 /// Poses as rows of an array.
 fn poses<'py>(py: Python<'py>, poses: &[StagePose]) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let numbers = poses.iter().flat_map(|pose| [pose.planar, pose.vertical]);
-    let flat: Vec<f64> = numbers.flatten().collect();
+    let flat: Vec<f64> = poses.iter().flat_map(StagePose::to_array).collect();
     PyArray1::from_vec(py, flat).reshape([poses.len(), 6])
 }

@@ -1,26 +1,26 @@
-//! A stage as it comes out of the workshop: the designed one with drawn tolerances.
+//! A stage from the workshop: the designed one with drawn tolerances.
 //!
-//! | what | drawn |
+//! | quantity | drawn |
 //! |---|---|
 //! | H1x .. H3y, eta | evenly in the inner 60 % of the search ranges of `stage.toml` |
 //! | yaw theta of a sensor, magnet and probe together | 0.3 deg |
 //! | probe off the centre line of its magnet, across / along u | 0.25 mm / 0.02 mm |
-//! | probe off the height at which a tilt does not move its signal | 2.5 mm |
+//! | probe off its tilt-neutral height (a tilt does not change its signal there) | 2.5 mm |
 //! | edges of the magnet * | within 50 um |
 //! | direction of the magnetisation, two angles * | within 1.5 deg |
 //! | seat of the magnet, three angles * | within 0.5 deg |
 //! | axis of the probe, two angles * | within 1 deg |
 //! | curvature of the element, even and odd * | within 0.3 % at 2 mm |
 //!
-//! "Within" is evenly between the limits, the other figures are standard deviations of normal
-//! numbers. Those with a star are zero for an even seed and drawn for an odd one
-//! ([`Magnets::of_seed`]).
+//! "Within" means evenly between the limits. The other figures are standard deviations of normal
+//! numbers. Tolerances with a star are zero for an even seed and drawn for an odd seed
+//! ([`Magnets::from_seed`]).
 //!
-//! Along u a probe is set to where the flux is zero at rest, as the paper asks; the 0.02 mm are
-//! what is left. The values follow from this model of a probe fitted to the service logs of
-//! three stages (across -0.6 to 0.1 mm, along 0.03 mm and less, off the height up to 5.5 mm,
-//! yaw up to 0.5 deg; it leaves no more than the noise), made narrower where H is drawn wider
-//! than those stages have it, so that Model (31) errs in service as on them.
+//! Along u a probe is placed at zero flux at rest, as the paper asks, with an error of 0.02 mm. The
+//! values come from a fit of this probe model to the service logs of three stages: across -0.6 to 0.1 mm,
+//! along up to 0.03 mm, height up to 5.5 mm, yaw up to 0.5 deg; the residuals are the noise. Tolerances
+//! are narrower here where H is drawn wider than on these stages, so that Model (31) has the same errors
+//! in service.
 
 use super::magnet::Cuboid;
 use super::pose::rotation;
@@ -31,7 +31,7 @@ use nalgebra::Vector3;
 use std::f64::consts::PI;
 
 const DEG: f64 = PI / 180.0;
-/// How much of a search range is used, about its middle.
+/// The share of a search range, about its middle, that is drawn from.
 const INNER: f64 = 0.6;
 const YAW_RAD: f64 = 0.3 * DEG;
 const ACROSS_M: f64 = 0.25e-3;
@@ -44,7 +44,7 @@ const AXIS_RAD: f64 = 1.0 * DEG;
 const CURVATURE: f64 = 3e-3;
 const CURVATURE_AT_M: f64 = 2e-3;
 
-/// What the magnets and Hall elements of a stage are.
+/// The quality of the magnets and Hall elements of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Magnets {
     /// Cuboids as designed, elements without curvature.
@@ -54,8 +54,8 @@ pub enum Magnets {
 }
 
 impl Magnets {
-    /// Those of a seed: as designed if it is even, imperfect if it is odd.
-    pub const fn of_seed(seed: u64) -> Self {
+    /// As designed for an even seed, imperfect for an odd one.
+    pub const fn from_seed(seed: u64) -> Self {
         if seed.is_multiple_of(2) {
             Self::AsDesigned
         } else {
@@ -74,13 +74,8 @@ pub struct Assembly {
 impl Assembly {
     /// The stage of a seed.
     pub fn draw(stage: &Stage, seed: u64) -> Self {
-        Self::with_magnets(stage, seed, Magnets::of_seed(seed))
-    }
-
-    /// The stage of a seed with magnets of this kind; all else is as drawn for the seed.
-    pub fn with_magnets(stage: &Stage, seed: u64, magnets: Magnets) -> Self {
         let mut random = Stream::new(seed, Purpose::Assembly, 0);
-        let imperfect = match magnets {
+        let imperfect = match Magnets::from_seed(seed) {
             Magnets::AsDesigned => 0.0,
             Magnets::Imperfect => 1.0,
         };
@@ -108,7 +103,7 @@ fn inner(range: Range, random: &mut Stream) -> f64 {
     middle + INNER * range.width() * (random.uniform() - 0.5)
 }
 
-/// A probe at (x, y); what makes the magnet imperfect is drawn, then multiplied by `imperfect`.
+/// A probe at (x, y). The tolerances of the magnet are drawn, then multiplied by `imperfect`, 0 or 1.
 fn probe(
     random: &mut Stream,
     [x_m, y_m]: [f64; 2],
@@ -155,10 +150,9 @@ mod tests {
     use hallstage_input::shipped::stage;
 
     fn slope(probe: &TrimmedProbe, axis: usize) -> f64 {
-        let mut planar = [0.0; 3];
-        planar[axis] = 1e-5;
-        let vertical = [0.0; 3];
-        probe.signal_m(&StagePose { planar, vertical }) / 1e-5
+        let mut pose = StagePose::default();
+        pose.planar[axis] = 1e-5;
+        probe.signal_m(&pose) / 1e-5
     }
 
     #[test]

@@ -1,25 +1,25 @@
-//! A stage made of physics, so that a lab can rehearse a calibration before it has the stage,
-//! and tests know the truth. It assumes no model of this project: a model that fits its logs
-//! has earned it.
+//! A simulated stage: magnets and their fields, a rigid body, sensors with noise and drift.
 //!
-//! | module | what it does |
+//! A lab rehearses a calibration with it before the stage exists, and tests compare a fit with the
+//! truth. The simulation uses none of the models that are fitted.
+//!
+//! | module | content |
 //! |---|---|
 //! | [`magnet`] | the field of a magnetised cuboid |
-//! | [`pose`] | where a rigid stage is |
+//! | [`pose`] | position and orientation of a rigid stage |
 //! | [`probe`] | a Hall probe over its magnet: from pose to signal |
 //! | [`assembly`] | a stage with drawn tolerances |
-//! | [`protocol`], [`plan_file`] | how it moves |
+//! | [`protocol`], [`plan_file`] | its motion |
 //! | [`sensors`] | noise, drift, resets, converters, beams |
-//! | [`thermal`] | how its parts follow temperature, and a working day |
-//! | [`recording`] | all steps in a row: the log, in memory |
+//! | [`thermal`] | the effect of temperature on its parts, a working day |
+//! | [`recording`] | all steps in a row: the log in memory |
 //! | [`log_text`] | the log and the truth as CSV |
-//! | [`random`] | numbers that are the same on every machine |
+//! | [`random`] | random numbers that are the same on every machine |
 //!
-//! A seed names a stage: all protocols and plans of one seed run on the same one, each with its
-//! own noise. The same seed gives the same bytes on every machine.
+//! A seed is a stage: all protocols and plans with one seed run on the same stage, each with its own
+//! noise. The same seed gives the same bytes on every machine.
 //!
-//! Not simulated: vibration, lag between the sensors, and how the servo follows
-//! its trajectory.
+//! Vibration, lag between the sensors and the errors of the servo are not simulated.
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;

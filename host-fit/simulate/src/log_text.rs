@@ -1,4 +1,4 @@
-//! A recording as CSV: the log in the columns of the given logs, and the truth.
+//! A recording as CSV: the log and the true poses.
 
 use super::recording::Recording;
 use hallstage_input::log::layout::Quantity;
@@ -10,9 +10,9 @@ use std::fmt::Write;
 /// The columns of a truth file.
 pub const TRUTH_HEADER: &str = "movement,t_us,x_nm,y_nm,rz_nrad,z_nm,rx_nrad,ry_nrad";
 
-/// The log, in the columns and units that the stage names; by default those of the given logs:
-/// `movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,..,hall_a_cnt,..`; then, in a climate, the
-/// temperatures that the stage names.
+/// The log, in the columns and units of the stage file, by default
+/// `movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,..,hall_a_cnt,..`. In a climate, the columns of
+/// `[temperature]` follow.
 pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
     let first = recording.movements.iter().flatten().next();
     let in_climate = first.is_some_and(|sample| sample.temperature_mc != [MISSING_CODE; 2]);
@@ -37,11 +37,7 @@ pub fn truth_csv(recording: &Recording) -> String {
     for (movement, (poses, samples)) in movements.enumerate() {
         for (pose, sample) in poses.iter().zip(samples) {
             let _ = write!(text, "{movement},{}", sample.t_us);
-            for value in pose.planar.iter().chain(&pose.vertical) {
-                // Rounded first, and zero added: never -0.00.
-                let hundredths = (value * 1e11).round() + 0.0;
-                let _ = write!(text, ",{:.2}", hundredths / 100.0);
-            }
+            pose.append_to(&mut text, 2);
             text.push('\n');
         }
     }
@@ -69,10 +65,7 @@ mod tests {
             t_us: 2000,
             ..sample
         };
-        let pose = StagePose {
-            planar: [1e-9, -2.346e-9, -1e-13],
-            vertical: [1.5e-4, 0.0, 3e-7],
-        };
+        let pose = StagePose::from_array([1e-9, -2.346e-9, -1e-13, 1.5e-4, 0.0, 3e-7]);
         Recording {
             movements: vec![vec![sample, later], vec![sample]],
             truth: vec![vec![StagePose::default(), pose], vec![pose]],
@@ -108,21 +101,14 @@ mod tests {
         set(Quantity::BeamX, "ifm_x_um", 1e-6);
         set(Quantity::HallA, "Hall A [V]", 1.0 / 3.125e-4);
         let csv = log_csv(&recording, &stage);
-        let read = read_bytes(
-            csv.as_bytes(),
-            "log".as_ref(),
-            &stage,
-            &ReadOptions::default(),
-        );
+        let options = ReadOptions::default();
+        let read = read_bytes(csv.as_bytes(), "log".as_ref(), &stage, &options);
         let rows = read.expect("a sound log").dataset.rows;
         assert_eq!((rows.len(), rows[1].t_us), (3, 2000));
         assert!((rows[2].reference[0] - 1e-9).abs() < 1e-20);
         assert_eq!(rows[2].frame.hall(), [-7, 8, -9]);
-        let read: Vec<_> = rows.iter().map(|row| row.frame.temperature_mc()).collect();
+        let read = rows.iter().map(|row| row.frame.temperature_mc());
         let written = recording.movements.iter().flatten();
-        assert!(
-            read.into_iter()
-                .eq(written.map(|sample| sample.temperature_mc))
-        );
+        assert!(read.eq(written.map(|sample| sample.temperature_mc)));
     }
 }

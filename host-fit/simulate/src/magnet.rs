@@ -1,15 +1,15 @@
 //! Field of a uniformly magnetised cuboid, in closed form.
 //!
-//! A cuboid with the magnetisation M carries the surface charge M . n on its faces; integrating
-//! the charges' field over the faces leaves one logarithm or arctangent a corner (the textbook
-//! result for a charged rectangle). With mu0 M = J the field outside is B = N J, where
+//! A cuboid with the magnetisation M carries the surface charge M . n on its faces. The field of a
+//! charged rectangle has one logarithm or arctangent for each corner (textbook result). With mu0 M = J
+//! the field outside is B = N J, where
 //!
 //! ```text
 //! X = x -+ a, Y = y -+ b, Z = z -+ c, R = |(X, Y, Z)|: from each of the 8 corners, sign + - ..
 //! N_xx = -1/(4 pi) sum sign atan(Y Z / (X R))       N_xy = 1/(4 pi) sum sign ln(R + Z)
 //! ```
 //!
-//! and the others follow by turning x, y, z in a circle. N is symmetric, and its trace is zero
+//! and the other entries follow by cyclic exchange of x, y, z. N is symmetric, and its trace is zero
 //! outside the magnet.
 
 use nalgebra::{Matrix3, Vector3};
@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 pub struct Cuboid {
     /// Half the lengths of its edges, m.
     pub half_m: Vector3<f64>,
-    /// Remanence J = mu0 M, in any unit: the field has the same.
+    /// Remanence J = mu0 M, in any unit. The field has the same unit.
     pub remanence: Vector3<f64>,
 }
 
@@ -31,10 +31,10 @@ impl Cuboid {
     }
 }
 
-/// The matrix N of the module's text.
+/// The matrix N of the module documentation.
 fn shape_tensor(half_m: Vector3<f64>, at_m: Vector3<f64>) -> Matrix3<f64> {
     let mut diagonal = [0.0; 3];
-    // One logarithm for the eight corners: of the product, with signs as powers.
+    // One logarithm of the product over the eight corners, with signs as powers.
     let mut products = [1.0; 3];
     for corner in 0..8 {
         let mut sign = 1.0;

@@ -6,8 +6,8 @@
 //! 2000,0.18,3.12,-1.02,0.44,-0.71,0.93
 //! ```
 //!
-//! The columns stand in this order; every row is one servo period after the one before. It is read
-//! as any table of numbers is: separators, comments and compression as in logs.
+//! The columns stand in this order. Rows are one servo period apart. Separators, comments and compression
+//! are as in logs.
 
 use super::pose::StagePose;
 use super::protocol::Trajectory;
@@ -22,29 +22,29 @@ pub const COLUMNS: [&str; 7] = [
     "t_us", "x_um", "y_um", "rz_urad", "z_um", "rx_urad", "ry_urad",
 ];
 
-/// Rows at most: an hour at 500 Hz, and some.
+/// Maximum number of rows: an hour at 500 Hz, and some.
 const ROWS_MAX: usize = 2_000_000;
 
-/// Largest sensible value, m or rad: ten times what such a stage moves.
+/// Largest sensible value, m or rad: ten times the range of such a stage.
 const VALUE_MAX: f64 = 1e-2;
 
 /// Why a plan is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanFileError {
-    /// It cannot be read, or is no table of numbers.
+    /// The file cannot be read, or is no table of numbers.
     #[error(transparent)]
     Table(#[from] LogError),
-    /// It has other columns.
+    /// The file has other columns.
     #[error("{}: the columns are {found}; they must be {}", path.display(), COLUMNS.join(","))]
     Columns {
         /// The file.
         path: PathBuf,
-        /// Its columns.
+        /// The columns of the file.
         found: String,
     },
-    /// Its rows are not one servo period apart.
+    /// The rows are not one servo period apart.
     #[error(
-        "{}:{line}: t_us is {t_us}, where {due_us} is due: every row is one servo period of {period_us} us after the one before",
+        "{}:{line}: t_us is {t_us}, where {due_us} is due: rows are one servo period of {period_us} us apart",
         path.display()
     )]
     Time {
@@ -54,12 +54,12 @@ pub enum PlanFileError {
         line: usize,
         /// The time there, us.
         t_us: i64,
-        /// The time that it should be, us.
+        /// The right time, us.
         due_us: i64,
         /// The servo period, us.
         period_us: f64,
     },
-    /// It has no rows, or too many.
+    /// The file has no rows, or too many.
     #[error("{}: a run has from 1 to {ROWS_MAX} rows, one for every servo period", path.display())]
     Rows {
         /// The file.
@@ -72,17 +72,17 @@ pub enum PlanFileError {
 /// # Errors
 /// Every variant of [`PlanFileError`].
 pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileError> {
-    of_text(
+    from_text(
         TextReader::open(path).map_err(LogError::from)?,
         servo_period_s,
     )
 }
 
-/// As [`read`], from its text.
+/// Reads a plan for a stage of this servo period from text.
 ///
 /// # Errors
 /// Every variant of [`PlanFileError`].
-pub fn of_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, PlanFileError> {
+pub fn from_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, PlanFileError> {
     let mut table = Table::open(text, |name| COLUMNS.contains(&name))?;
     if table.head.names != COLUMNS {
         return Err(PlanFileError::Columns {
@@ -113,19 +113,17 @@ pub fn of_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, 
                 period_us,
             });
         }
-        let value = |column: usize| {
-            let unit = if matches!(column, 1 | 2 | 4) {
+        let mut pose = [0.0; 6];
+        for (column, value) in (1..).zip(&mut pose) {
+            let unit = if COLUMNS[column].ends_with("_um") {
                 "m"
             } else {
                 "rad"
             };
-            let value = table.cell(column).scaled(1e-6, VALUE_MAX, unit);
-            value.map_err(bad(column))
-        };
-        poses.push(StagePose {
-            planar: [value(1)?, value(2)?, value(3)?],
-            vertical: [value(4)?, value(5)?, value(6)?],
-        });
+            let cell = table.cell(column).scaled(1e-6, VALUE_MAX, unit);
+            *value = cell.map_err(bad(column))?;
+        }
+        poses.push(StagePose::from_array(pose));
         if poses.len() > ROWS_MAX {
             break;
         }
@@ -138,18 +136,14 @@ pub fn of_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, 
     }
 }
 
-/// The text of a plan, to 10 pm and prad: differences of neighbouring rows still show the
-/// acceleration.
+/// A plan as text, to 10 pm and prad, so that differences of neighbouring rows show the acceleration.
 pub fn to_csv(poses: &[StagePose], servo_period_s: f64) -> String {
     let mut text = COLUMNS.join(",") + "\n";
     text.reserve(80 * poses.len());
     for (k, pose) in poses.iter().enumerate() {
         // Writing to memory cannot fail.
         let _ = write!(text, "{}", (k as f64 * servo_period_s * 1e6).round());
-        for value in pose.planar.iter().chain(&pose.vertical) {
-            // Rounded first, and zero added: never -0.00000.
-            let _ = write!(text, ",{:.5}", (value * 1e11).round() / 1e5 + 0.0);
-        }
+        pose.append_to(&mut text, 5);
         text.push('\n');
     }
     text
@@ -163,11 +157,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("run.csv");
         std::fs::write(&path, text).expect("written");
-        read(&path, 0.002).map_err(|error| {
-            error
-                .to_string()
-                .replace(&path.display().to_string(), "run.csv")
-        })
+        let name = path.display().to_string();
+        read(&path, 0.002).map_err(|error| error.to_string().replace(&name, "run.csv"))
     }
 
     fn header() -> String {
@@ -182,28 +173,20 @@ mod tests {
         );
         let poses = parse(&text).expect("a sound plan");
         assert_eq!(poses.len(), 2);
-        assert_eq!(poses[0].planar, [1.0, -2.0, 3.0].map(|x| x * 1e-6));
-        assert_eq!(poses[0].vertical, [4.0, -5.0, 6.0].map(|x| x * 1e-6));
+        let want = [1.0, -2.0, 3.0, 4.0, -5.0, 6.0].map(|x| x * 1e-6);
+        assert_eq!(poses[0].to_array(), want);
         assert_eq!(poses[1].planar[2], 0.5e-6);
     }
 
     #[test]
     fn a_plan_reads_back_as_it_was_written() {
-        let pose = StagePose {
-            planar: [1.25e-4, -3e-12, 0.0],
-            vertical: [-2e-4, 7.6e-10, 4.8e-4],
-        };
+        let pose = StagePose::from_array([1.25e-4, -3e-12, 0.0, -2e-4, 7.6e-10, 4.8e-4]);
         let text = to_csv(&[StagePose::default(), pose, pose], 0.002);
         assert!(text.contains("\n2000,125.00000,0.00000,"), "{text}");
         let read = parse(&text).expect("a sound plan");
         assert_eq!((read.len(), read[0]), (3, StagePose::default()));
-        for (read, pose) in [
-            (read[1].planar, pose.planar),
-            (read[1].vertical, pose.vertical),
-        ] {
-            for axis in 0..3 {
-                assert!((read[axis] - pose[axis]).abs() < 6e-12);
-            }
+        for (read, written) in read[1].to_array().iter().zip(pose.to_array()) {
+            assert!((read - written).abs() < 6e-12);
         }
     }
 

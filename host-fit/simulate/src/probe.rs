@@ -1,11 +1,11 @@
 //! A Hall probe on the stage over its magnet on the framework.
 //!
-//! The magnet lies with its long edge, along which it is magnetised, on the sensing axis u; the
-//! probe is `gap` above its upper face and senses the vertical flux, which is zero over the
-//! magnet's middle and goes with u. (A magnet that is magnetised upwards under a probe that
-//! senses along u gives the same signal, since the matrix N of [`super::magnet`] is symmetric.)
-//! The probe's axis tilts with the stage and then picks up some of the flux along u: this acts
-//! as if the probe were [`TILT_LEVER_M`] lower than it is.
+//! The long edge of the magnet lies along the sensing axis u, and the magnet is magnetised along it.
+//! The probe is `gap` above the upper face and senses the vertical flux. This flux is zero over the
+//! middle of the magnet and proportional to u. (A magnet that is magnetised upwards under a probe
+//! that senses along u gives the same signal, since the matrix N of [`super::magnet`] is symmetric.)
+//! When the stage tilts, the probe also senses some of the flux along u, as if the probe were
+//! [`TILT_LEVER_M`] lower.
 
 use super::magnet::Cuboid;
 use super::pose::StagePose;
@@ -14,15 +14,15 @@ use nalgebra::{Matrix3, Vector3};
 /// Half the edges of the designed magnet, 12.7 x 6.4 x 6.4 mm (section 2 of the paper), m.
 pub const MAGNET_HALF_M: Vector3<f64> = Vector3::new(6.35e-3, 3.2e-3, 3.2e-3);
 
-/// Distance of the designed probe from the magnet's upper face, m. The paper does not give it;
-/// with 4.0 mm the slope falls with height as in the given logs, by 215 to 237 per m at
-/// sensitivities of 0.93 to 0.67.
+/// Distance of the designed probe from the magnet's upper face, m. The paper does not state it. With
+/// 4.0 mm the slope falls with height as in the given logs, by 215 to 237 per m at sensitivities of 0.93
+/// to 0.67.
 pub const DESIGNED_GAP_M: f64 = 4.0e-3;
 
 /// Flux along u over slope of the vertical flux, m: 4.5 to 4.6 mm at any gap from 4 to 6 mm.
 pub const TILT_LEVER_M: f64 = 4.54e-3;
 
-/// Gaps between which the slope falls steadily with the gap, m.
+/// Range of gaps, m. The slope falls steadily with the gap there.
 const GAPS_M: [f64; 2] = [2.0e-3, 12.0e-3];
 
 /// One probe with its magnet, as assembled.
@@ -30,58 +30,59 @@ const GAPS_M: [f64; 2] = [2.0e-3, 12.0e-3];
 pub struct HallProbe {
     /// The probe in the coordinates of the stage, m; Z from the plane of the centroid.
     pub position_m: Vector3<f64>,
-    /// What the probe senses, as a direction of the stage; (0, 0, 1) as designed.
+    /// The sensing direction in the coordinates of the stage; (0, 0, 1) as designed.
     pub axis: Vector3<f64>,
-    /// The probe at rest in the coordinates u (sensed), w (across), v (up) of the magnet's
-    /// mount, whose origin is the middle of the designed magnet, m.
+    /// The probe at rest in the coordinates u (sensed), w (across), v (up) of the magnet's mount, from
+    /// the middle of the designed magnet, m.
     pub at_rest_m: Vector3<f64>,
     /// Turns u, w, v into the framework.
     pub mount: Matrix3<f64>,
     /// Turns directions of the magnet's edges into u, w, v.
     pub seat: Matrix3<f64>,
-    /// The magnet; remanence in units of that of the designed one.
+    /// The magnet; its remanence in units of the designed remanence.
     pub magnet: Cuboid,
     /// Curvature of the element: a reading s becomes s (1 + k2 s + k3 s^2), 1/m and 1/m^2.
     pub curvature: [f64; 2],
 }
 
-/// What another temperature makes of a probe and its magnet.
+/// The effect of temperature on a probe and its magnet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Warmed {
-    /// Remanence in parts of what it was.
+pub struct ThermalChange {
+    /// Remanence over the remanence before.
     pub remanence: f64,
-    /// Growth of the stage and of the framework in parts of their size.
+    /// Relative expansion of the stage.
     pub body: f64,
-    /// See above.
+    /// Relative expansion of the framework.
     pub frame: f64,
-    /// Growth of the gap by what holds probe and magnet, m.
+    /// Growth of the gap by the mounts of probe and magnet, m.
     pub gap_m: f64,
-    /// Gain of the Hall element, and what it reads without a field in units of the designed
-    /// remanence.
-    pub element: [f64; 2],
+    /// Gain of the Hall element.
+    pub gain: f64,
+    /// Signal of the Hall element without a field, in units of the designed remanence.
+    pub offset: f64,
 }
 
-/// A probe whose amplifier is trimmed: it reads zero at rest.
+/// A probe with a trimmed amplifier: its signal is zero at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrimmedProbe {
     probe: HallProbe,
     rest_flux: f64,
     flux_per_m: f64,
-    /// Gain of the Hall element, and what it reads without a field, in units of the flux.
+    /// Gain of the Hall element, and its signal without a field in units of the flux.
     element: [f64; 2],
 }
 
 impl HallProbe {
-    /// Sets the probe along u to where it senses no flux at rest.
+    /// Moves the probe along u to zero flux at rest.
     pub fn centre(&mut self) {
         let slope_per_m = slope_per_m(self.at_rest_m.z - MAGNET_HALF_M.z);
-        // Each step leaves a few per cent of the one before: the slope is nearly right.
+        // Newton's steps with a slope that is right to a few per cent.
         for _ in 0..8 {
             self.at_rest_m.x -= self.flux(&StagePose::default()) / slope_per_m;
         }
     }
 
-    /// Trims the amplifier at rest; its gain is that for the slope of the designed magnet.
+    /// Trims the amplifier at rest, with the gain for the slope of the designed magnet.
     pub fn trimmed(self) -> TrimmedProbe {
         TrimmedProbe {
             probe: self,
@@ -105,7 +106,7 @@ impl HallProbe {
 }
 
 impl TrimmedProbe {
-    /// What the probe reads at a pose, at the designed scale, m.
+    /// The signal at a pose, at the designed scale, m.
     pub fn signal_m(&self, pose: &StagePose) -> f64 {
         let [gain, offset] = self.element;
         let flux = gain * self.probe.flux(pose) + offset;
@@ -114,28 +115,28 @@ impl TrimmedProbe {
         s * (1.0 + s * (k2 + s * k3))
     }
 
-    /// The same later: its signal times `gain`, as temperature and age change magnet and amplifier.
+    /// The probe after its signal changed by the factor `gain`, by age of magnet or amplifier.
     #[must_use]
     pub fn with_gain(mut self, gain: f64) -> Self {
         self.flux_per_m /= gain;
         self
     }
 
-    /// The same with its parts at another temperature, the amplifier as trimmed.
+    /// The probe at another temperature, with the amplifier as trimmed.
     #[must_use]
-    pub fn warmed(mut self, by: &Warmed) -> Self {
-        self.probe.magnet.remanence *= by.remanence;
-        // Stage and framework grow about the origin, which is the middle of the interferometers.
-        let moved = self.probe.position_m * (by.body - by.frame);
-        self.probe.position_m *= 1.0 + by.body;
+    pub fn warmed(mut self, change: &ThermalChange) -> Self {
+        self.probe.magnet.remanence *= change.remanence;
+        // Stage and framework grow about the origin, the middle of the interferometers.
+        let moved = self.probe.position_m * (change.body - change.frame);
+        self.probe.position_m *= 1.0 + change.body;
         self.probe.at_rest_m += self.probe.mount.tr_mul(&moved);
-        self.probe.at_rest_m.z += by.gap_m;
-        self.element = by.element;
+        self.probe.at_rest_m.z += change.gap_m;
+        self.element = [change.gain, change.offset];
         self
     }
 
-    /// The same after the probe was taken off and put back `moved_m` farther along u, w, v, and
-    /// its amplifier trimmed to zero again.
+    /// The probe after it was taken off and put back `moved_m` farther along u, w, v, with its
+    /// amplifier trimmed to zero again.
     #[must_use]
     pub fn reseated(mut self, moved_m: Vector3<f64>) -> Self {
         self.probe.at_rest_m += moved_m;
@@ -166,12 +167,12 @@ fn slope_per_m(gap_m: f64) -> f64 {
     designed_magnet().field(at).z / STEP_M
 }
 
-/// The gap at which the designed magnet gives a probe this sensitivity, in parts of the
-/// designed one, m; within 2 to 12 mm.
+/// The gap at which a probe over the designed magnet has this share of the designed sensitivity, m;
+/// within 2 to 12 mm.
 pub fn gap_m(sensitivity: f64) -> f64 {
     let [mut near, mut far] = GAPS_M;
     let wanted = sensitivity * slope_per_m(DESIGNED_GAP_M);
-    // 10 mm halved 40 times: far below what any workshop can hold.
+    // 10 mm halved 40 times is far below any tolerance.
     for _ in 0..40 {
         let middle = 0.5 * (near + far);
         if slope_per_m(middle) > wanted {
@@ -187,7 +188,7 @@ pub fn gap_m(sensitivity: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A probe as designed but for its gap: A of the paper, which senses Y.
+    /// Probe A of the paper, which senses Y, with a gap for this sensitivity.
     fn probe(sensitivity: f64) -> TrimmedProbe {
         HallProbe {
             position_m: Vector3::new(0.1975, 0.4, TILT_LEVER_M),

@@ -28,22 +28,21 @@ pub const TABLE_6: [[f64; 3]; 19] = [
     [0.0, 0.0, -100.0],
 ];
 
-/// What is run.
+/// A named motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
     /// The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn.
     Paper,
     /// All six axes at once, 8 movements of 8 s.
     Combined,
-    /// As combined, other trajectories, interferometers zeroed truly.
+    /// The same motion on other trajectories, with an exact zero of the interferometers.
     Service,
-    /// A working day in 37 pieces of service, one each quarter of an hour: 1 s of motion after 0.4 s
-    /// at rest, for a re-zero.
+    /// A working day in 37 pieces, one every quarter of an hour: 0.4 s at rest for a re-zero, then 1 s of
+    /// the combined motion.
     Day,
 }
 
-/// One movement: the pose of every servo period, between a reset of the interferometers and
-/// the next.
+/// One movement: the pose of every servo period between two resets of the interferometers.
 pub type Trajectory = Vec<StagePose>;
 
 /// A run of the stage.
@@ -51,11 +50,11 @@ pub type Trajectory = Vec<StagePose>;
 pub struct Run {
     /// The movements.
     pub movements: Vec<Trajectory>,
-    /// Whether the interferometers are zeroed truly; if not, every reset has an error.
-    pub zeroed_truly: bool,
-    /// Time from the begin of a movement to that of the next, s; `None` for one after the other.
+    /// Whether the zero of the interferometers is exact. If not, every reset has an error.
+    pub is_zero_exact: bool,
+    /// Time from one movement's begin to the next, s; `None` if the movements follow without a pause.
     pub spacing_s: Option<f64>,
-    /// Tells the noise of one run of a stage from that of another.
+    /// The number of the run: runs of one stage with other numbers have other noise.
     pub number: u64,
 }
 
@@ -65,7 +64,7 @@ const PAPER_AMPLITUDES: [f64; 3] = [300e-6, 500e-6, 300e-6];
 const PAPER_SINE: (f64, f64) = (1.0, 2.0);
 /// Amplitudes of the combined motion: X, Y, Rz and Z, Rx, Ry, m and rad.
 const COMBINED_AMPLITUDES: [[f64; 3]; 2] = [[250e-6, 400e-6, 250e-6], [120e-6, 240e-6, 240e-6]];
-/// Frequencies of the combined motion, Hz: any between these, as in the given logs.
+/// Range of the frequencies of the combined motion, Hz, as in the given logs.
 const COMBINED_HZ: [f64; 2] = [0.3, 2.0];
 const COMBINED_MOVEMENTS: usize = 8;
 const COMBINED_S: f64 = 8.0;
@@ -73,14 +72,14 @@ const DAY_MOVEMENTS: usize = 37;
 const DAY_SPACING_S: f64 = 900.0;
 /// Time at rest and of motion of a piece of the day, s.
 const DAY_PIECE_S: [f64; 2] = [REST_S, 1.0];
-/// How long a stage stands still before a movement of the day, s.
+/// Time at rest before each movement of the day, s.
 pub const REST_S: f64 = 0.4;
 
 /// Numbers of planned runs begin here.
 const PLANNED_FROM: u64 = 256;
 
 impl Protocol {
-    /// The run of this protocol for a seed; the paper's is the same for all.
+    /// The run of this protocol for a seed; the paper's protocol does not depend on the seed.
     pub fn run(self, servo_period_s: f64, seed: u64) -> Run {
         let number = self as u64;
         let movements = match self {
@@ -103,7 +102,7 @@ impl Protocol {
         };
         Run {
             movements,
-            zeroed_truly: self == Self::Service,
+            is_zero_exact: self == Self::Service,
             spacing_s: (self == Self::Day).then_some(DAY_SPACING_S),
             number,
         }
@@ -111,36 +110,36 @@ impl Protocol {
 }
 
 impl Run {
-    /// A planned run: one movement. Its number follows from its poses, so that two plans of one stage
-    /// do not share their noise.
+    /// A planned run: one movement. Its number follows from its poses, so that other plans have other
+    /// noise.
     pub fn planned(trajectory: Trajectory) -> Self {
-        let numbers = trajectory.iter().flat_map(|p| [p.planar, p.vertical]);
-        let number = numbered(numbers.flatten().map(f64::to_bits));
+        let numbers = trajectory.iter().flat_map(StagePose::to_array);
+        let number = hashed(numbers.map(f64::to_bits));
         Self {
             movements: vec![trajectory],
-            zeroed_truly: false,
+            is_zero_exact: false,
             spacing_s: None,
             number,
         }
     }
 
-    /// The same run in a climate: with a number of its own.
+    /// The run in a climate, with a number of its own.
     pub(super) fn in_climate(self, climate: &Climate) -> Self {
-        let number = numbered([self.number, climate.number()].into_iter());
+        let number = hashed([self.number, climate.number()].into_iter());
         Self { number, ..self }
     }
 }
 
-/// A number for a run that follows from these words: FNV-1a.
-fn numbered(words: impl Iterator<Item = u64>) -> u64 {
+/// The number of a run from these words (FNV-1a).
+fn hashed(words: impl Iterator<Item = u64>) -> u64 {
     let hash = words.fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| {
         (hash ^ word).wrapping_mul(0x0100_0000_01b3)
     });
-    // The stream of a run has room for 56 bits; the protocols have the first numbers.
+    // The stream of a run has room for 56 bits. The first numbers are the protocols'.
     PLANNED_FROM + (hash >> 16)
 }
 
-/// The poses of a movement of this length, from its time in s.
+/// A movement of this length; `pose` gets the time in s.
 fn trajectory(servo_period_s: f64, length_s: f64, pose: impl Fn(f64) -> StagePose) -> Trajectory {
     let rows = (length_s / servo_period_s).round() as usize;
     (0..rows).map(|k| pose(k as f64 * servo_period_s)).collect()
@@ -161,7 +160,7 @@ fn paper(servo_period_s: f64) -> Vec<Trajectory> {
         .collect()
 }
 
-/// A sine of its own frequency and phase along each axis, from rest position.
+/// A sine along each axis, with a drawn frequency and phase, from the initial pose.
 fn combined(servo_period_s: f64, length_s: f64, random: &mut Stream) -> Trajectory {
     let [low, high] = COMBINED_HZ;
     let waves = COMBINED_AMPLITUDES.map(|amplitudes| {
@@ -201,17 +200,15 @@ mod tests {
     fn combined_and_service_start_at_rest_and_move_every_axis_in_their_own_way() {
         let runs = [Protocol::Combined, Protocol::Service].map(|p| p.run(0.002, 1));
         assert_ne!(runs[0].movements, runs[1].movements);
-        assert!(!runs[0].zeroed_truly && runs[1].zeroed_truly);
+        assert!(!runs[0].is_zero_exact && runs[1].is_zero_exact);
         for run in &runs {
             assert_eq!(run.movements.len(), 8);
             for poses in &run.movements {
                 assert_eq!((poses.len(), poses[0]), (4000, StagePose::default()));
-                for axis in 0..6 {
-                    let [block, i] = [axis / 3, axis % 3];
-                    let of = |pose: &StagePose| [pose.planar, pose.vertical][block][i];
-                    let span = |f: fn(f64, f64) -> f64| poses.iter().map(of).fold(0.0, f);
-                    let span = span(f64::max) - span(f64::min);
-                    let amplitude = COMBINED_AMPLITUDES[block][i];
+                for (axis, amplitude) in COMBINED_AMPLITUDES.as_flattened().iter().enumerate() {
+                    let at = |pose: &StagePose| pose.to_array()[axis];
+                    let peak = |f: fn(f64, f64) -> f64| poses.iter().map(at).fold(0.0, f);
+                    let span = peak(f64::max) - peak(f64::min);
                     assert!((span / amplitude - 2.0).abs() < 1e-3, "{span}");
                 }
             }

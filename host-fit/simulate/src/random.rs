@@ -5,17 +5,17 @@ use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
-/// What a stream of numbers is for. Streams of one seed are independent of each other.
+/// The purpose of a stream. Streams of one seed are independent of each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// How a stage came out of the workshop.
+    /// The tolerances of a stage.
     Assembly = 1,
     /// The trajectories of a protocol.
     Motion = 2,
     /// Noise, drift and resets.
     Sensors = 3,
-    /// How parts follow temperature, and the errors of its sensors.
+    /// The temperature coefficients of the parts, and the errors of the temperature sensors.
     Thermal = 4,
 }
 
@@ -24,7 +24,7 @@ pub enum Purpose {
 pub struct Stream(ChaCha8Rng);
 
 impl Stream {
-    /// The stream of a seed for one purpose; `run` tells the runs of one stage apart.
+    /// The stream of a seed for one purpose and one run of the stage.
     pub fn new(seed: u64, purpose: Purpose, run: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(run << 8 | purpose as u64);

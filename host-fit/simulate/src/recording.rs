@@ -1,11 +1,11 @@
-//! What a run of a simulated stage leaves: codes, beams and the truth.
+//! The recording of a run of a simulated stage: codes, beams and the truth.
 
 use super::assembly::Assembly;
 use super::pose::StagePose;
 use super::protocol::Run;
 use super::random::{Purpose, Stream};
 use super::sensors::{ReferenceError, SensorErrors, beams_m, code, gaps_m};
-use super::thermal::{Climate, HELD_S, Thermal, Thermometers};
+use super::thermal::{Climate, HELD_S, TemperatureSensors, Thermal};
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::stage::Stage;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +16,7 @@ use runtime::frame::MISSING_CODE;
 /// Why a run cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordError {
-    /// A probe would meet its magnet.
+    /// A probe would hit its magnet.
     #[error(
         "movement {movement}, {t_us} us: probe {probe} would hit its magnet; keep the stage higher or tilt it less"
     )]
@@ -28,7 +28,7 @@ pub enum RecordError {
         /// Time within it, us.
         t_us: i64,
     },
-    /// Temperatures are to be recorded, and no column is named for them.
+    /// The stage file has no column for the temperatures.
     #[error(
         "the stage file names no column for a temperature: add [temperature] with mount = \"mount_mc\", \
          body = \"body_mc\" and unit = \"mC\""
@@ -36,7 +36,7 @@ pub enum RecordError {
     NoTemperature,
 }
 
-/// What one servo period gives.
+/// The readings of one servo period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// Time within the movement, us.
@@ -47,7 +47,7 @@ pub struct Sample {
     pub capacitive: [i32; 3],
     /// Hall codes of A, B, C.
     pub hall: [i32; 3],
-    /// Temperatures of mount and body, m degC; [`MISSING_CODE`] where no climate is simulated.
+    /// Temperatures of mount and body, m degC; [`MISSING_CODE`] without a climate.
     pub temperature_mc: [i32; 2],
 }
 
@@ -59,17 +59,18 @@ impl Sample {
     }
 }
 
-/// The log of a run, and where the stage truly was.
+/// The log of a run, and the true poses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The movements, sample after sample.
     pub movements: Vec<Vec<Sample>>,
-    /// The true poses: the run itself.
+    /// The true poses.
     pub truth: Vec<Vec<StagePose>>,
 }
 
-/// Runs the stage of a seed, with sensors as usual: without temperatures, or from an hour of a working day on,
-/// as a run of a day does from its beginning.
+/// Runs the stage of a seed with the usual errors of the sensors. With `hour` the run begins at this hour of
+/// a working day and records temperatures; [`super::protocol::Protocol::Day`] always does, by default from
+/// hour 0.
 ///
 /// # Errors
 /// See [`RecordError`].
@@ -90,8 +91,8 @@ pub fn record_stage(
     }
 }
 
-/// Runs a stage. `seed` is that of noise, drift and resets, in a stream of its own for each
-/// [`Run::number`]: it may be the one that the assembly was drawn from.
+/// Runs a stage. `seed` is for noise, drift and resets, with a stream for each [`Run::number`]. It may equal
+/// the seed of the assembly.
 ///
 /// # Errors
 /// [`RecordError::ProbeHitsMagnet`].
@@ -105,7 +106,7 @@ pub fn record(
     record_with(stage, assembly, run, errors, seed, None)
 }
 
-/// The same of a stage whose parts follow the temperatures of a climate, as [`Thermal`] has it.
+/// Runs a stage in a climate: its parts follow the temperature as in [`Thermal`].
 ///
 /// # Errors
 /// [`RecordError::ProbeHitsMagnet`].
@@ -127,22 +128,22 @@ fn record_with(
     run: Run,
     errors: &SensorErrors,
     seed: u64,
-    warmth: Option<(&Thermal, Climate)>,
+    climate: Option<(&Thermal, Climate)>,
 ) -> Result<Recording, RecordError> {
     let mut random = Stream::new(seed, Purpose::Sensors, run.number);
-    let mut thermometers = Thermometers::new(seed, run.number);
+    let mut thermometers = TemperatureSensors::new(seed, run.number);
     let mut movements = Vec::with_capacity(run.movements.len());
     let period_s = stage.servo_period_s;
     let rows_held = (HELD_S / period_s).round().max(1.0) as usize;
     let mut start_s = 0.0;
     for (movement, poses) in run.movements.iter().enumerate() {
-        let mut reference = ReferenceError::reset(errors, run.zeroed_truly, period_s, &mut random);
+        let mut reference = ReferenceError::reset(errors, run.is_zero_exact, period_s, &mut random);
         let mut samples = Vec::with_capacity(poses.len());
         let mut warmed = *assembly;
         let mut temperature_mc = [MISSING_CODE; 2];
         for (k, pose) in poses.iter().enumerate() {
             let t_us = (k as f64 * period_s * 1e6).round() as i64;
-            if let (Some((thermal, climate)), 0) = (&warmth, k % rows_held) {
+            if let (Some((thermal, climate)), 0) = (&climate, k % rows_held) {
                 let celsius = climate.at(start_s + k as f64 * period_s);
                 warmed = thermal.warmed(assembly, celsius);
                 temperature_mc = thermometers.read_mc(celsius);
@@ -179,20 +180,19 @@ fn record_with(
 }
 
 impl Recording {
-    /// How many samples there are.
+    /// The number of samples.
     pub fn rows(&self) -> usize {
         self.movements.iter().map(Vec::len).sum()
     }
 
-    /// The log as the fit sees it: what reading [`super::log_text::log_csv`] gives, less the
-    /// hash of a file. `None` if the capacitive sensors stand in one line, which no checked
-    /// stage has.
+    /// The log as the fit reads it from [`super::log_text::log_csv`], without the hash of a file. `None` if
+    /// the capacitive sensors stand in one line; a checked stage never has that.
     pub fn dataset(&self, stage: &Stage) -> Option<Dataset> {
         Self::joined(&[self], stage)
     }
 
-    /// The same with the true poses for a reference.
-    pub fn dataset_of_truth(&self, stage: &Stage) -> Option<Dataset> {
+    /// The log with the true poses as its reference.
+    pub fn dataset_with_truth(&self, stage: &Stage) -> Option<Dataset> {
         let mut dataset = self.dataset(stage)?;
         for (row, truth) in dataset.rows.iter_mut().zip(self.truth.iter().flatten()) {
             row.reference = truth.planar;
@@ -200,7 +200,7 @@ impl Recording {
         Some(dataset)
     }
 
-    /// What reading several logs gives.
+    /// Several logs read together.
     pub fn joined(logs: &[&Self], stage: &Stage) -> Option<Dataset> {
         let per_gap = vertical_per_gap(&stage.capacitive_probes_m)?;
         let mut dataset = Dataset::default();
@@ -224,9 +224,7 @@ impl Recording {
 }
 
 fn row(stage: &Stage, per_gap: &Matrix3<f64>, movement: usize, sequence: u32, s: &Sample) -> Row {
-    let gaps = s
-        .capacitive
-        .map(|code| f64::from(code) * stage.capacitive.m_per_count);
+    let gaps = (s.capacitive).map(|code| f64::from(code) * stage.capacitive.m_per_count);
     let [x, y1, y2] = s.beams_nm.map(|nm| nm as f64 * 1e-9);
     Row {
         movement,
@@ -265,12 +263,8 @@ mod tests {
     fn the_dataset_is_what_reading_the_log_gives() {
         let recording = short(Protocol::Combined, &SensorErrors::USUAL, 1);
         let csv = log_csv(&recording, &stage());
-        let read = read_bytes(
-            csv.as_bytes(),
-            "simulated".as_ref(),
-            &stage(),
-            &ReadOptions::default(),
-        );
+        let options = ReadOptions::default();
+        let read = read_bytes(csv.as_bytes(), "simulated".as_ref(), &stage(), &options);
         let read = read.expect("a sound log");
         assert_eq!(read.warnings, []);
         let dataset = recording.dataset(&stage()).expect("a triangle");
@@ -297,10 +291,7 @@ mod tests {
     #[test]
     fn a_run_that_drives_a_probe_into_its_magnet_is_refused() {
         let stage = stage();
-        let low = StagePose {
-            vertical: [-8e-3, 0.0, 0.0],
-            ..StagePose::default()
-        };
+        let low = StagePose::from_array([0.0, 0.0, 0.0, -8e-3, 0.0, 0.0]);
         let run = Run::planned(vec![StagePose::default(), low]);
         let assembly = Assembly::draw(&stage, 1);
         let error = record(&stage, &assembly, run, &SensorErrors::USUAL, 1).expect_err("too low");

@@ -1,8 +1,8 @@
-//! From a pose to what the converters and the interferometers give.
+//! From a pose to the codes of the converters and the counts of the interferometers.
 //!
-//! | what | value | source |
+//! | quantity | value | source |
 //! |---|---|---|
-//! | Hall noise | 0.5 um rms at the designed scale | `README.md` of the given logs; fits leave 0.49-0.51 |
+//! | Hall noise | 0.5 um rms at the designed scale | `README.md` of the given logs; residuals of fits 0.49-0.51 |
 //! | capacitive noise | 12 nm rms | same; 12.8 with the converter's steps |
 //! | noise of a beam | 5 nm rms | service logs against their truth |
 //! | drift of X and of Y | random walk, 110 nm after 1 s, 0.31 um after 8 s | same |
@@ -13,7 +13,7 @@ use super::pose::StagePose;
 use super::random::Stream;
 use hallstage_input::stage::{CodeScale, Stage};
 
-/// How imperfect the sensors are: standard deviations.
+/// Standard deviations of the errors of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorErrors {
     /// White noise of a Hall reading at the designed scale, m.
@@ -29,7 +29,7 @@ pub struct SensorErrors {
 }
 
 impl SensorErrors {
-    /// Those of the given logs.
+    /// As in the given logs.
     pub const USUAL: Self = Self {
         hall_m: 0.5e-6,
         gap_m: 12e-9,
@@ -37,7 +37,7 @@ impl SensorErrors {
         drift_per_root_s: [110e-9, 110e-9, 85e-9],
         reset: [2.1e-6, 2.1e-6, 1.6e-6],
     };
-    /// None but the steps of the converters: for what a fit would find in a log without end.
+    /// No errors but the steps of the converters, as for a fit to an endless log.
     pub const NONE: Self = Self {
         hall_m: 0.0,
         gap_m: 0.0,
@@ -47,16 +47,16 @@ impl SensorErrors {
     };
 }
 
-/// The code of a value, held at the converter's rails.
+/// The code of a value, limited to the converter's range.
 pub fn code(value_m: f64, scale: &CodeScale) -> i32 {
     let (low, high) = (scale.window.low - 1, scale.window.high + 1);
     let code = (value_m / scale.m_per_count).round();
-    // A cast keeps to the range of the type.
+    // The cast saturates.
     (code as i32).clamp(low, high)
 }
 
-/// The gap changes at the capacitive sensors, which stand on the framework: heights of the
-/// stage's plane at their places, m.
+/// The changes of the gaps at the capacitive sensors on the framework, m: heights of the stage's plane
+/// at their places.
 pub fn gaps_m(stage: &Stage, pose: &StagePose) -> [f64; 3] {
     let (at, normal) = (pose.position_m(), pose.rotation().column(2).into_owned());
     stage
@@ -64,14 +64,14 @@ pub fn gaps_m(stage: &Stage, pose: &StagePose) -> [f64; 3] {
         .map(|[x, y]| at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z)
 }
 
-/// The displacements along the beams X, Y1, Y2 of X, Y, Rz, m: the Y beams meet the stage at
-/// plus and minus half their distance.
+/// The displacements along the beams X, Y1, Y2 for X, Y, Rz, m. The Y beams meet the stage at plus and
+/// minus half their distance.
 pub fn beams_m(stage: &Stage, [x, y, rz]: [f64; 3]) -> [f64; 3] {
     let half = 0.5 * stage.y_baseline_m * libm::sin(rz);
     [x, y + half, y - half]
 }
 
-/// What the interferometers are off: a walk that starts at the error of the reset.
+/// The error of the interferometers: a random walk that starts at the error of the reset.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceError {
     error: [f64; 3],
@@ -79,22 +79,22 @@ pub struct ReferenceError {
 }
 
 impl ReferenceError {
-    /// That of a movement which starts now.
+    /// At the begin of a movement.
     pub fn reset(
         errors: &SensorErrors,
-        zeroed_truly: bool,
+        is_zero_exact: bool,
         period_s: f64,
         random: &mut Stream,
     ) -> Self {
         let reset = errors.reset.map(|deviation| random.normal(deviation));
         let root = libm::sqrt(period_s);
         Self {
-            error: if zeroed_truly { [0.0; 3] } else { reset },
+            error: if is_zero_exact { [0.0; 3] } else { reset },
             step: errors.drift_per_root_s.map(|drift| drift * root),
         }
     }
 
-    /// The error now in X, Y (m) and Rz (rad); the walk then goes on by a servo period.
+    /// The error in X, Y (m) and Rz (rad) now; the walk then advances by a servo period.
     pub fn next(&mut self, random: &mut Stream) -> [f64; 3] {
         let now = self.error;
         for (error, step) in self.error.iter_mut().zip(self.step) {

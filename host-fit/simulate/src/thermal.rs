@@ -1,30 +1,30 @@
-//! How a stage follows temperature, and how warm it is: of its mount (magnets, framework) and of its
-//! body (Hall elements, stage).
+//! The temperatures of a stage and their effect, for the mount M (magnets, framework) and the body H (Hall
+//! elements, stage).
 //!
-//! | what | drawn: mean, standard deviation | source |
+//! | quantity | drawn: mean, standard deviation | source |
 //! |---|---|---|
-//! | remanence, NdFeB, with M | -0.11 %/K, 0.005 of a stage and 0.005 of each magnet | sheets of magnets; scatter assumed |
-//! | gain of a Hall element, with H | 0, 0.01 %/K | sheets of uncompensated parts |
+//! | remanence, NdFeB, with M | -0.11 %/K, 0.005 for a stage and 0.005 for each magnet | data sheets of magnets; scatter assumed |
+//! | gain of a Hall element, with H | 0, 0.01 %/K | data sheets of uncompensated parts |
 //! | offset of a Hall element, with H | 0, 1.6 uT/K at 1.3 T of remanence | same |
 //! | gap, with M | 0.4, 0.2 um/K | 20 mm of metal |
 //! | expansion of stage (H) and of framework (M) | 6e-6, 2e-6 1/K | ceramics, granite, steel |
 //! | error of a temperature sensor, for a run | 0, 25 mK | from run to run stable to 0.1 K |
 //! | its noise, each 100 ms | 0, 20 mK | `README.md` of the given logs |
 //!
-//! The working day is that of the given logs: work from 0 to 4 h and from 5 h on; a room with a wave of
-//! a day.
+//! The working day is as in the given logs: work from 0 to 4 h and from 5 h on, in a room with a daily
+//! wave of temperature.
 
 use super::assembly::Assembly;
-use super::probe::Warmed;
+use super::probe::ThermalChange;
 use super::random::{Purpose, Stream};
 use std::f64::consts::TAU;
 
-/// Temperature at which a stage is assembled and its amplifiers are trimmed, degC.
+/// Temperature during assembly, where the amplifiers are trimmed, degC.
 pub const ASSEMBLED_C: f64 = 20.0;
 /// How long a converter holds a temperature, s.
 pub const HELD_S: f64 = 0.1;
 
-/// Remanence that offsets of Hall elements refer to, T.
+/// Remanence for the offsets of the Hall elements, T.
 const REMANENCE_T: f64 = 1.3;
 const REMANENCE_PER_K: f64 = -1.1e-3;
 const REMANENCE_SCATTER_PER_K: f64 = 5e-5;
@@ -35,11 +35,11 @@ const EXPANSION_PER_K: [f64; 2] = [6e-6, 2e-6];
 const SENSOR_K: f64 = 0.025;
 const SENSOR_NOISE_K: f64 = 0.02;
 
-/// The body above the room when at work, K, and its time constant, s.
+/// Rise of the body over the room in work, K, and its time constant, s.
 const BODY: (f64, f64) = (5.2, 22.0 * 60.0);
-/// The mount above the room in parts of that, and its time constant, s.
+/// Rise of the mount over the rise of the body, and its time constant, s.
 const MOUNT: (f64, f64) = (0.36, 46.0 * 60.0);
-/// Mean of the room, degC, amplitude of its wave, K, and the hour at which it rises through the mean.
+/// Mean of the room, degC, amplitude of its wave, K, and the hour of the rising zero crossing.
 const ROOM: (f64, f64, f64) = (22.0, 1.8, 4.0);
 /// Work begins and pauses, h.
 const BEGINS_AND_PAUSES: [f64; 4] = [0.0, 4.0, 5.0, f64::INFINITY];
@@ -47,9 +47,9 @@ const BEGINS_AND_PAUSES: [f64; 4] = [0.0, 4.0, 5.0, f64::INFINITY];
 /// Temperatures of mount and body during a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Climate {
-    /// Those of a working day; the run begins at this hour of it.
+    /// A working day.
     Day {
-        /// Hours after work begins; before it the stage is as warm as the room.
+        /// Begin of the run, hours after the begin of work. Before work the stage is as warm as the room.
         hour: f64,
     },
     /// All parts at one temperature, degC.
@@ -57,7 +57,7 @@ pub enum Climate {
 }
 
 impl Climate {
-    /// Temperatures of mount and body a time after the run's begin (s), degC.
+    /// Temperatures of mount and body at a time after the begin of the run (s), degC.
     pub fn at(&self, time_s: f64) -> [f64; 2] {
         match *self {
             Self::Steady(celsius) => [celsius; 2],
@@ -83,7 +83,7 @@ impl Climate {
         }
     }
 
-    /// What tells the noise of a run in this climate from that of the same run in another.
+    /// A number for the noise of a run in this climate.
     pub(super) const fn number(&self) -> u64 {
         match *self {
             Self::Day { hour } => hour.to_bits().rotate_left(1),
@@ -92,29 +92,29 @@ impl Climate {
     }
 }
 
-/// How the parts of a stage follow temperature.
+/// Temperature coefficients of the parts of a stage, of A, B, C where there are three.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thermal {
-    /// Of the magnets of A, B, C, 1/K.
+    /// Remanence of the magnets, 1/K.
     pub remanence_per_k: [f64; 3],
-    /// Gain of the Hall elements of A, B, C, 1/K.
+    /// Gain of the Hall elements, 1/K.
     pub gain_per_k: [f64; 3],
-    /// Their offset, designed remanences per K.
+    /// Offset of the Hall elements, designed remanences per K.
     pub offset_per_k: [f64; 3],
-    /// Growth of the gaps of A, B, C with the mount, m/K.
+    /// Growth of the gaps with the mount, m/K.
     pub gap_m_per_k: [f64; 3],
     /// Expansion of the framework (with the mount) and of the stage (with the body), 1/K.
     pub expansion_per_k: [f64; 2],
 }
 
 impl Thermal {
-    /// That of the stage of a seed.
+    /// The coefficients for the stage of a seed.
     pub fn draw(seed: u64) -> Self {
         let mut random = Stream::new(seed, Purpose::Thermal, 0);
-        let of_stage = REMANENCE_PER_K + random.normal(REMANENCE_SCATTER_PER_K);
+        let mean = REMANENCE_PER_K + random.normal(REMANENCE_SCATTER_PER_K);
         let mut three = |mean: f64, deviation| [(); 3].map(|()| mean + random.normal(deviation));
         Self {
-            remanence_per_k: three(of_stage, REMANENCE_SCATTER_PER_K),
+            remanence_per_k: three(mean, REMANENCE_SCATTER_PER_K),
             gain_per_k: three(0.0, HALL_GAIN_PER_K),
             offset_per_k: three(0.0, HALL_OFFSET_PER_K),
             gap_m_per_k: three(GAP_M_PER_K[0], GAP_M_PER_K[1]),
@@ -126,41 +126,37 @@ impl Thermal {
     /// A stage with mount and body at these temperatures, degC.
     pub fn warmed(&self, assembly: &Assembly, celsius: [f64; 2]) -> Assembly {
         let [mount_k, body_k] = celsius.map(|celsius| celsius - ASSEMBLED_C);
-        let probe = |k: usize| {
-            assembly.probes[k].warmed(&Warmed {
+        let probes = [0, 1, 2].map(|k| {
+            assembly.probes[k].warmed(&ThermalChange {
                 remanence: 1.0 + self.remanence_per_k[k] * mount_k,
                 frame: self.expansion_per_k[0] * mount_k,
                 body: self.expansion_per_k[1] * body_k,
                 gap_m: self.gap_m_per_k[k] * mount_k,
-                element: [
-                    1.0 + self.gain_per_k[k] * body_k,
-                    self.offset_per_k[k] * body_k,
-                ],
+                gain: 1.0 + self.gain_per_k[k] * body_k,
+                offset: self.offset_per_k[k] * body_k,
             })
-        };
-        Assembly {
-            probes: [probe(0), probe(1), probe(2)],
-        }
+        });
+        Assembly { probes }
     }
 }
 
-/// Two sensors of temperature: an error for the run, and noise.
+/// The temperature sensors of mount and body: an error for the run, and noise.
 #[derive(Debug)]
-pub struct Thermometers {
+pub struct TemperatureSensors {
     random: Stream,
     error_k: [f64; 2],
 }
 
-impl Thermometers {
-    /// Those of a run, by its number.
+impl TemperatureSensors {
+    /// The sensors of a run with this number.
     pub fn new(seed: u64, run: u64) -> Self {
-        // The stage itself has the first stream.
+        // The coefficients of the stage have the first stream.
         let mut random = Stream::new(seed, Purpose::Thermal, run + 1);
         let error_k = [(); 2].map(|()| random.normal(SENSOR_K));
         Self { random, error_k }
     }
 
-    /// What they read of mount and body at these temperatures (degC), m degC.
+    /// Readings of mount and body at these temperatures (degC), m degC.
     pub fn read_mc(&mut self, celsius: [f64; 2]) -> [i32; 2] {
         [0, 1].map(|k| {
             let read = celsius[k] + self.error_k[k] + self.random.normal(SENSOR_NOISE_K);
@@ -206,13 +202,9 @@ mod tests {
     fn sensitivities_follow_both_temperatures() {
         let slope = |assembly: &Assembly, probe: usize| {
             let at = |u: f64| {
-                let planar = if probe == 2 {
-                    [u, 0.0, 0.0]
-                } else {
-                    [0.0, u, 0.0]
-                };
-                let vertical = [0.0; 3];
-                assembly.probes[probe].signal_m(&StagePose { planar, vertical })
+                let mut pose = StagePose::default();
+                pose.planar[usize::from(probe != 2)] = u;
+                assembly.probes[probe].signal_m(&pose)
             };
             at(1e-4) - at(-1e-4)
         };
@@ -225,7 +217,7 @@ mod tests {
                 };
                 let k = thermal.remanence_per_k[probe] - 226.0 * thermal.gap_m_per_k[probe];
                 let [mount, body] = [[25.0, 20.0], [20.0, 25.0]].map(change);
-                // What is left is the expansion: a probe beside the centre line moves across it.
+                // The rest is the expansion: a probe beside the centre line moves across it.
                 assert!((mount - k).abs() < 1e-4, "{seed} {probe}: {mount} {k}");
                 let h = thermal.gain_per_k[probe];
                 assert!((body - h).abs() < 1e-4, "{seed} {probe}: {body} {h}");

@@ -255,7 +255,7 @@ fn day(stage: &Stage) -> Result<String, HostError> {
     let mut blind = cold.clone();
     let samples = blind.movements.iter_mut().flatten();
     samples.for_each(|sample| sample.temperature_mc = [MISSING_CODE; 2]);
-    let day = day.dataset_of_truth(stage).unwrap_or_default();
+    let day = day.dataset_with_truth(stage).unwrap_or_default();
     let ratios = |logs: &[&Recording]| -> Result<String, HostError> {
         let dataset = Recording::joined(logs, stage).unwrap_or_default();
         let model = ModelChoice::Named(Model::of(ModelKind::Field));

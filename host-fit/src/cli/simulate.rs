@@ -28,12 +28,11 @@ pub(super) struct SimulateArgs {
     /// Run this protocol.
     #[arg(long, value_parser = choice::<Protocol>(), conflicts_with = "plan")]
     protocol: Option<Protocol>,
-    /// Begin the run at this hour of a working day (work begins at 0), and follow the temperatures of
-    /// mount and body, whose columns [temperature] of the stage file names: -0.2 is cold, 3.5 warm.
+    /// Begin the run at this hour of a working day (work begins at 0): -0.2 is cold, 3.5 warm. The log then
+    /// has the temperature columns of [temperature] in the stage file.
     #[arg(long, value_name = "H", value_parser = hour, allow_negative_numbers = true)]
     hour: Option<f64>,
-    /// Which stage, and its noise: an even one has magnets as designed, an odd one imperfect
-    /// magnets.
+    /// Stage and noise. An even seed has magnets as designed, an odd seed imperfect magnets.
     #[arg(long, value_name = "N")]
     seed: u64,
     /// Where to write the log: CSV, or CSV.gz if the name ends so; `-` for standard output.
@@ -75,7 +74,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     }
     outputs.add(&args.out, &bytes(&args.out, log_csv(&recording, &stage))?)?;
     outputs.commit()?;
-    let magnets = match Magnets::of_seed(args.seed) {
+    let magnets = match Magnets::from_seed(args.seed) {
         Magnets::AsDesigned => "magnets as designed",
         Magnets::Imperfect => "imperfect magnets",
     };

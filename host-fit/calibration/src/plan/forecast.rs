@@ -1,6 +1,6 @@
-//! What a fit to a run will give, before anything is measured.
+//! The forecast of a fit to a run, before anything is measured.
 
-use super::run::Run;
+use super::run::PlannedRun;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::problem::parameters::Parameters;
@@ -10,8 +10,8 @@ use hallstage_solver::solve::field::parameters::{FALL_PER_M, FieldParameters};
 use hallstage_solver::solve::field::whiten::Noise;
 use runtime::model::Sensitivity;
 
-/// The stage as it is known before it is calibrated: probes at their designed places with
-/// sensitivities in the middle of the search range, over magnets on whose centre lines they sit.
+/// The stage before its calibration: probes at their designed places over the centre lines of the
+/// magnets, with sensitivities in the middle of the search range.
 fn designed(stage: &Stage) -> FieldParameters {
     let geometry = stage.geometry();
     let etas = stage.search.of("eta");
@@ -31,8 +31,8 @@ fn designed(stage: &Stage) -> FieldParameters {
     FieldParameters::of_model_31(&Parameters::of_model_31(&geometry, &sensitivity), stage)
 }
 
-/// What is known of a stage before it is calibrated: as designed, with the noise of the given
-/// logs. `None` where its probes don't determine a pose of its service.
+/// The forecaster for a stage before its calibration: as designed, with the noise of the given logs.
+/// `None` where the probes do not determine a pose of the service.
 pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
     let sensors = SensorErrors::USUAL;
     let noise = Noise {
@@ -43,19 +43,19 @@ pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
     Forecaster::new(&designed(stage), &noise, ([x, y, rz], [z, rx, ry]))
 }
 
-/// The forecast for a run that is recorded every `period_s` and looked at every `step_s`; `None`
-/// where it doesn't determine the parameters.
+/// The forecast for a run that is recorded every `period_s` and sampled here every `step_s`; `None` where
+/// the run does not determine the parameters.
 pub fn forecast(
     forecaster: &Forecaster,
-    run: &Run,
+    run: &PlannedRun,
     period_s: f64,
     step_s: f64,
 ) -> Option<Forecast> {
-    forecaster.forecast(&rows_of(&[(run, [0.0; 2])], step_s), step_s / period_s)
+    forecaster.forecast(&rows(&[(run, [0.0; 2])], step_s), step_s / period_s)
 }
 
-/// Rows of runs, each a movement at its distance (mount, body) from T0, K, looked at every `step_s`.
-pub(super) fn rows_of(runs: &[(&Run, [f64; 2])], step_s: f64) -> Rows {
+/// Rows of runs, sampled every `step_s`. Each run is a movement at a distance (mount, body) from T0 in K.
+pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
     let (mut rows, mut movements) = (Vec::new(), Vec::new());
     for (run, change_k) in runs {
         let start = rows.len();

@@ -1,11 +1,11 @@
-//! The run to make for the field model, and what to expect of it before anything is measured.
+//! The run to make for the field model, and the errors to expect, before anything is measured.
 //!
-//! | file | what it holds |
+//! | file | content |
 //! |---|---|
 //! | [`run`] | six sines between smooth ends |
-//! | [`mod@forecast`] | what a fit to a run will give |
+//! | [`mod@forecast`] | the forecast of a fit to a run |
 //! | [`search`] | the choice of the frequencies |
-//! | [`temperature`] | the logs that determine how the stage follows temperature |
+//! | [`temperature`] | the logs that determine the temperature coefficients |
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -27,49 +27,49 @@ use forecast::{forecast, forecaster};
 use hallstage_input::axis::AXES;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
-use run::Run;
+use run::PlannedRun;
 
-/// Errors in service over the noise floor that a run may lead to. Beyond this the run, not the
-/// sensors, decides how good the stage is.
+/// Largest predicted error in service over the noise floor of an accepted run: the sensors, not the run,
+/// then limit the stage.
 pub const RATIO_MAX: f64 = 1.03;
 /// Longest run, s: nothing is gained beyond a few minutes.
 pub const SECONDS_MAX: f64 = 600.0;
-/// Most servo periods of a run.
+/// Maximum number of servo periods of a run.
 pub const PERIODS_MAX: f64 = 2e6;
 /// Length of the ends, s, where the limits allow it.
 const TAPER_S: f64 = 0.5;
-/// Longest ends, as a part of the run.
+/// Longest ends, as a share of the run.
 const TAPER_MAX: f64 = 0.25;
-/// Most rows that the final forecast looks at.
+/// Maximum number of rows in the final forecast.
 const ROWS_MAX: f64 = 20_000.0;
 
-/// A run and what it leads to.
+/// A run and its forecast.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The run.
-    pub run: Run,
-    /// What a fit to it will give on a stage as designed.
+    pub run: PlannedRun,
+    /// The forecast of a fit to the run, for a stage as designed.
     pub forecast: Forecast,
 }
 
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// An axis can't reach its amplitude within its limits.
+    /// An axis cannot reach its amplitude within its limits.
     #[error(
-        "a run of {seconds} s can't move {axis} by {:.1} {} to both sides within the limits of its speed and \
+        "a run of {seconds} s cannot move {axis} by {:.1} {} to both sides within the limits of its speed and \
          acceleration; make the run longer, or change amplitude or limits in [motion] of stage.toml",
         amplitude * 1e6, if axis.starts_with('r') { "urad" } else { "um" }
     )]
     TooFast {
         /// Its key in `[motion]`.
         axis: &'static str,
-        /// How far it should move, m or rad.
+        /// Its amplitude, m or rad.
         amplitude: f64,
         /// The length, s.
         seconds: f64,
     },
-    /// The axes can't all have a frequency of their own.
+    /// There are fewer than six different frequencies for the axes.
     #[error(
         "a run of {seconds} s is too short for six different frequencies within the limits of speed and acceleration; \
          make it longer, or raise the limits in [motion] of stage.toml"
@@ -78,9 +78,9 @@ pub enum PlanError {
         /// The length, s.
         seconds: f64,
     },
-    /// The designed probes don't determine a pose of the service.
+    /// The designed probes do not determine a pose of the service.
     #[error(
-        "the probes as designed don't determine every pose of the service; correct [hall] or the range of service in \
+        "the probes as designed do not determine every pose of the service; correct [hall] or the range of service in \
          [motion] of stage.toml"
     )]
     NoPose,
@@ -94,25 +94,25 @@ pub enum PlanError {
         seconds: f64,
         /// Errors in service over the noise floor, X, Y, Rz.
         ratios: [f64; 3],
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
 }
 
-/// The best run of this length for a stage of unknown assembly.
+/// The best run of this length for a stage before its calibration.
 ///
 /// # Errors
 /// Every variant of [`PlanError`].
 pub fn plan(stage: &Stage, seconds: f64) -> Result<Plan, PlanError> {
     let mut taper_s = TAPER_S.min(TAPER_MAX * seconds);
     let allowed = loop {
-        let of_axis =
-            |axis: usize| search::allowed_cycles(&stage.motion.axes[axis], axis, seconds, taper_s);
-        let allowed: [Vec<f64>; 6] = std::array::from_fn(of_axis);
+        let allowed: [Vec<f64>; 6] = std::array::from_fn(|axis| {
+            search::allowed_cycles(&stage.motion.axes[axis], axis, seconds, taper_s)
+        });
         let Some(axis) = allowed.iter().position(Vec::is_empty) else {
             break allowed;
         };
-        // Longer ends are slower.
+        // With longer ends speed and acceleration are lower.
         if taper_s >= TAPER_MAX * seconds {
             return Err(PlanError::TooFast {
                 axis: AXES[axis].key,
@@ -128,11 +128,11 @@ pub fn plan(stage: &Stage, seconds: f64) -> Result<Plan, PlanError> {
     judged(stage, &forecaster, run)
 }
 
-/// A run with its forecast, if that is good enough.
+/// A run with its forecast, if the predicted errors are small enough.
 ///
 /// # Errors
 /// [`PlanError::NotDetermined`].
-pub fn judged(stage: &Stage, forecaster: &Forecaster, run: Run) -> Result<Plan, PlanError> {
+pub fn judged(stage: &Stage, forecaster: &Forecaster, run: PlannedRun) -> Result<Plan, PlanError> {
     let step_s = stage.servo_period_s.max(run.seconds / ROWS_MAX);
     let refused = |ratios| {
         Err(PlanError::NotDetermined {
@@ -152,8 +152,8 @@ pub fn judged(stage: &Stage, forecaster: &Forecaster, run: Run) -> Result<Plan, 
     }
 }
 
-/// What to change about a run that determines too little.
-fn remedy(stage: &Stage, run: &Run) -> String {
+/// The remedy for a run that determines too little.
+fn remedy(stage: &Stage, run: &PlannedRun) -> String {
     let short = AXES.iter().zip(&stage.motion.axes).zip(run.amplitudes);
     let short: Vec<&str> = short
         .filter(|((_, motion), amplitude)| *amplitude < motion.service)

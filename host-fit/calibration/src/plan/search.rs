@@ -1,41 +1,40 @@
-//! The choice of the six frequencies, by the service error that each set leads to.
+//! The choice of the six frequencies, by the predicted error in service.
 //!
-//! Axes that move together can't be separated, and products of two axes that fall on the frequency
-//! of a third, or near zero where the reference drifts, are badly determined. No rule sees all of that:
-//! sets are drawn, judged by their forecast, and the best is improved axis by axis.
+//! Axes that move together cannot be separated. A product of two axes is badly determined on the
+//! frequency of a third axis, and near zero, where the reference drifts. No simple rule covers this: sets
+//! are drawn, judged by their forecast, and the best set is improved axis by axis.
 
 use super::forecast::forecast;
-use super::run::Run;
+use super::run::PlannedRun;
 use hallstage_input::stage::{AxisMotion, Stage};
 use hallstage_simulate::random::{Purpose, Stream};
 use hallstage_solver::solve::field::forecast::Forecaster;
 use rayon::prelude::*;
 
-/// Highest frequency, Hz: faster motion shakes the stage and gains nothing, since the reference
-/// hardly drifts within a second.
+/// Highest frequency, Hz. Faster motion shakes the stage and gains nothing, since the reference hardly
+/// drifts within a second.
 const FREQUENCY_MAX_HZ: f64 = 2.0;
-/// Frequencies are multiples of half a cycle in the length of a run: that far apart, sines differ.
+/// Cycles are multiples of one half: sines half a cycle apart differ enough.
 const CYCLE_STEP: f64 = 0.5;
 /// Fewest cycles.
 const CYCLES_MIN: f64 = 1.0;
-/// How closely a run is looked at while the choice is made, s.
+/// Sampling interval of a run during the choice, s.
 const STEP_S: f64 = 0.04;
-/// Sets that are judged before the best of them goes on.
+/// Sets in a batch. The best set goes on to the next batch.
 const BATCH: usize = 16;
-/// Batches times seconds: a long run takes longer to judge and less choosing.
+/// Batches times the length of the run in s: a long run is slow to judge and easy to choose.
 const BATCH_SECONDS: f64 = 200.0;
-/// Fewest and most batches; the first third are drawn anew.
+/// Fewest and most batches. The first third draw all six axes anew.
 const BATCHES: (usize, usize) = (3, 10);
-/// Cycles of a set that is good on a stage of the usual limits, in parts of the highest: where the
-/// choice starts.
+/// The first set, cycles over the highest allowed ones: good for a stage with usual limits.
 const START: [f64; 6] = [0.7, 0.85, 0.75, 1.0, 0.9, 0.55];
 
-/// Numbers of cycles that an axis can do within its limits, in ascending order.
+/// The numbers of cycles within the limits of an axis, in ascending order.
 pub fn allowed_cycles(motion: &AxisMotion, axis: usize, seconds: f64, taper_s: f64) -> Vec<f64> {
     let most = (FREQUENCY_MAX_HZ * seconds / CYCLE_STEP).floor() as u32;
     let least = (CYCLES_MIN / CYCLE_STEP) as u32;
     let within = |cycles: &f64| {
-        let run = Run {
+        let run = PlannedRun {
             seconds,
             taper_s,
             amplitudes: [motion.amplitude; 6],
@@ -48,22 +47,22 @@ pub fn allowed_cycles(motion: &AxisMotion, axis: usize, seconds: f64, taper_s: f
     steps.filter(within).collect()
 }
 
-/// The best run found with these cycles allowed to each axis; `None` where six can't be distinct.
+/// The best run found with the allowed cycles of each axis; `None` where six cannot be distinct.
 pub fn best(
     stage: &Stage,
     forecaster: &Forecaster,
     seconds: f64,
     taper_s: f64,
     allowed: &[Vec<f64>; 6],
-) -> Option<Run> {
-    let run = |cycles: [f64; 6]| Run {
+) -> Option<PlannedRun> {
+    let run = |cycles: [f64; 6]| PlannedRun {
         seconds,
         taper_s,
         amplitudes: stage.motion.axes.map(|axis| axis.amplitude),
         cycles,
     };
     let step_s = STEP_S.max(stage.servo_period_s);
-    // Variance by the parameters over that by noise, of the worst axis.
+    // The variance due to the parameters over the variance due to noise, for the worst axis.
     let cost = |cycles: &[f64; 6]| {
         let forecast = forecast(forecaster, &run(*cycles), stage.servo_period_s, step_s);
         forecast.map_or(f64::INFINITY, |forecast| forecast.service.worst())
@@ -75,21 +74,16 @@ pub fn best(
     for batch in 0..batches {
         while sets.len() < BATCH {
             let mut set = best.1;
-            // Anew: all six in turn; later one or two.
-            let changes = if batch * 3 < batches {
-                6
-            } else {
-                1 + sets.len() % 2
-            };
+            // At first all six axes change, later one or two.
             let first = (6.0 * random.uniform()) as usize;
-            for k in 0..changes {
-                let axis = (first + k * (1 + sets.len() / 2 % 5)) % 6;
-                redraw(
-                    &mut set,
-                    if changes == 6 { k } else { axis },
-                    allowed,
-                    &mut random,
-                );
+            let second = first + 1 + sets.len() / 2 % 5;
+            let changed = match (batch * 3 < batches, sets.len() % 2) {
+                (true, _) => &[0, 1, 2, 3, 4, 5][..],
+                (false, 0) => &[first],
+                (false, _) => &[first, second % 6],
+            };
+            for &axis in changed {
+                redraw(&mut set, axis, allowed, &mut random);
             }
             sets.push(set);
         }
@@ -103,20 +97,20 @@ pub fn best(
     Some(run(best.1))
 }
 
-/// Other cycles for one axis: any that it can do and no other axis has.
+/// Draws new cycles for one axis, different from the other axes.
 fn redraw(set: &mut [f64; 6], axis: usize, allowed: &[Vec<f64>; 6], random: &mut Stream) {
     let others = *set;
     let free = |cycles: &&f64| (0..6).all(|k| k == axis || others[k] != **cycles);
     let free: Vec<&f64> = allowed[axis].iter().filter(free).collect();
-    // The upper part: slow sines are lost in the drift.
+    // The upper three quarters: slow sines are lost in the drift.
     let place = random.between(0.25, 1.0) * free.len() as f64;
     if let Some(cycles) = free.get(place as usize) {
         set[axis] = **cycles;
     }
 }
 
-/// A first set: for each axis what is nearest to [`START`] and not taken; the axis with the
-/// fewest to choose from chooses first.
+/// The first set: for each axis the free cycles nearest to [`START`]. The axis with the fewest allowed
+/// cycles chooses first.
 fn start(allowed: &[Vec<f64>; 6]) -> Option<[f64; 6]> {
     let mut order = [0, 1, 2, 3, 4, 5];
     order.sort_by_key(|&axis| allowed[axis].len());

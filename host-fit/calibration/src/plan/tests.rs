@@ -1,6 +1,6 @@
-//! Properties of a plan, and what simulated stages make of it.
+//! Properties of a plan, and its forecast against simulated stages.
 
-use super::run::Run;
+use super::run::PlannedRun;
 use super::*;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped::STAGE_TOML;
@@ -23,24 +23,19 @@ static STAGE: LazyLock<Stage> =
 static FORECASTER: LazyLock<Forecaster> = LazyLock::new(|| forecaster(&STAGE).expect("poses"));
 static PLAN: LazyLock<Plan> = LazyLock::new(|| plan(&STAGE, SECONDS).expect("a plan"));
 
-fn six(pose: &StagePose) -> [f64; 6] {
-    let ([x, y, rz], [z, rx, ry]) = (pose.planar, pose.vertical);
-    [x, y, rz, z, rx, ry]
-}
-
 /// Differences of neighbouring rows against the limits, ends and rest before and after included.
 #[track_caller]
-fn assert_within_limits(run: &Run, stage: &Stage) {
+fn assert_within_limits(run: &PlannedRun, stage: &Stage) {
     let period_s = stage.servo_period_s;
     let mut poses = run.trajectory(period_s);
     assert_eq!(poses.first(), Some(&StagePose::default()));
-    assert_eq!(six(&poses[poses.len() - 1]), [0.0; 6]);
+    assert_eq!(poses[poses.len() - 1].to_array(), [0.0; 6]);
     poses.insert(0, StagePose::default());
     poses.push(StagePose::default());
     let mut jerk = [0.0f64; 6];
     let mut before = [0.0; 6];
     for three in poses.windows(3) {
-        let [a, b, c] = [&three[0], &three[1], &three[2]].map(six);
+        let [a, b, c] = [&three[0], &three[1], &three[2]].map(StagePose::to_array);
         for (axis, limits) in stage.motion.axes.iter().enumerate() {
             assert!(b[axis].abs() <= limits.amplitude);
             let speed = (c[axis] - b[axis]) / period_s;
@@ -69,7 +64,7 @@ fn a_run_moves_every_axis_fully_within_its_limits_from_rest_to_rest() {
     for (axis, limits) in STAGE.motion.axes.iter().enumerate() {
         let largest = poses
             .iter()
-            .map(|pose| six(pose)[axis].abs())
+            .map(|pose| pose.to_array()[axis].abs())
             .fold(0.0, f64::max);
         assert!(largest > 0.99 * limits.service, "{axis}: {largest}");
     }
@@ -86,7 +81,7 @@ fn the_frequencies_are_distinct() {
     }
 }
 
-/// The fastest run of a stage that must move gently, whose ends have to be longer.
+/// The fastest run of a stage that must move gently needs longer ends.
 #[test]
 fn low_limits_make_slow_runs_with_long_ends() {
     let mut stage = STAGE.clone();
@@ -100,7 +95,7 @@ fn low_limits_make_slow_runs_with_long_ends() {
         std::array::from_fn(|axis| allowed(axis).last().copied())
     };
     assert_eq!(fastest(0.5)[1], None);
-    let run = Run {
+    let run = PlannedRun {
         seconds,
         taper_s,
         amplitudes: stage.motion.axes.map(|axis| axis.amplitude),
@@ -139,7 +134,7 @@ fn two_axes_at_one_frequency_are_refused() {
 
 #[test]
 fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
-    let says = |run: &Run, parts: &[&str]| {
+    let says = |run: &PlannedRun, parts: &[&str]| {
         let message = judged(&STAGE, &FORECASTER, *run)
             .expect_err("refused")
             .to_string();
@@ -156,7 +151,7 @@ fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
     let mut small = PLAN.run;
     small.amplitudes = small.amplitudes.map(|amplitude| 0.5 * amplitude);
     says(&small, &["move x, y, rz, z, rx, ry over their whole"]);
-    let short = Run {
+    let short = PlannedRun {
         seconds: 4.0,
         cycles: [2.5, 4.0, 3.0, 3.5, 2.0, 1.5],
         ..PLAN.run
@@ -170,7 +165,10 @@ fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
     let mut stiff = STAGE.clone();
     stiff.motion.axes[4].speed = 1e-6;
     let message = plan(&stiff, SECONDS).expect_err("refused").to_string();
-    assert!(message.contains("can't move rx by 480.0 urad"), "{message}");
+    assert!(
+        message.contains("cannot move rx by 480.0 urad"),
+        "{message}"
+    );
 }
 
 fn fitted(dataset: &Dataset) -> FieldFit {
@@ -183,21 +181,17 @@ fn fitted(dataset: &Dataset) -> FieldFit {
     fit_field(dataset, &all, &STAGE, &start.parameters).expect("a fit")
 }
 
-/// Logs of the run on stages of physics: what their fits say of themselves, and how far they are
-/// off at poses all over the range, against the forecast.
+/// The run on simulated stages: the predicted errors of the fits, and their true errors at poses all over
+/// the range, agree with the forecast.
 #[test]
 fn the_forecast_is_what_fits_to_simulated_logs_give() {
     let forecast = &PLAN.forecast.service;
     let places: Vec<StagePose> = (0..400)
         .map(|k| {
-            let at = |axis: usize| {
+            StagePose::from_array(std::array::from_fn(|axis| {
                 let phase = f64::from(k) * (0.9 + 0.37 * axis as f64);
                 STAGE.motion.axes[axis].service * 0.8 * libm::sin(phase)
-            };
-            StagePose {
-                planar: [at(0), at(1), at(2)],
-                vertical: [at(3), at(4), at(5)],
-            }
+            }))
         })
         .collect();
     let seeds = 2..=4;

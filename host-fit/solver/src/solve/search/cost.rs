@@ -42,7 +42,7 @@ pub fn ranks_before(a: f64, b: f64) -> bool {
 /// Moves each number that lies outside its interval to the nearer end; NaN to the lower one.
 pub fn clip(individual: &mut [f64], bounds: &[Range]) {
     for (x, range) in individual.iter_mut().zip(bounds) {
-        // `max` takes the number where the other one is NaN.
+        // `max` of NaN and a number is the number.
         *x = x.max(range.low).min(range.high);
     }
 }

@@ -67,7 +67,7 @@ fn the_path_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// A function whose minimum lies outside its box, which watches where it is evaluated.
+/// A function with its minimum outside the box. It counts the evaluations outside.
 struct Watched {
     bounds: [Range; 3],
     outside: AtomicUsize,

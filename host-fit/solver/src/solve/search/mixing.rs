@@ -1,10 +1,10 @@
 //! p, the share of individuals that learn rather than mutate, and how it adapts
 //! (equations 25 and 27-29).
 //!
-//! Choices that the paper leaves open:
+//! Choices where the paper is silent:
 //! - The learning period is one generation; both phases count together.
-//! - p is kept within [`P_MIN`] to [`P_MAX`], so that neither kind of step dies out. It stays as it was
-//!   when the formula gives 0/0.
+//! - p is kept within [`P_MIN`] to [`P_MAX`], so that neither kind of step dies out. It does not
+//!   change when the formula gives 0/0.
 //! - Equation 29 has no value where the old cost is NaN, infinite or zero. The decline is 1 there.
 
 use super::cost::ranks_before;
@@ -29,7 +29,7 @@ pub enum Mixing {
 /// How p is adapted to the success of the two kinds of step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Adaptation {
-    /// p stays as it is (equations 23, 24).
+    /// p does not change (equations 23, 24).
     Fixed,
     /// p follows how many individuals each kind improved (equation 25).
     SuccessRatio,
@@ -37,7 +37,7 @@ pub enum Adaptation {
     DeclineRatio,
 }
 
-/// The step that one individual takes.
+/// A kind of step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Equations 16-18: the step of TLBO.
@@ -59,7 +59,7 @@ pub struct Tally {
     pub decline: [f64; 2],
 }
 
-/// Equation 29: the share of the old cost by which the new one is lower.
+/// Equation 29: the decline of the cost over the old cost.
 pub fn relative_decline(old: f64, new: f64) -> f64 {
     let decline = (old - new) / old.abs();
     if decline.is_finite() { decline } else { 1.0 }

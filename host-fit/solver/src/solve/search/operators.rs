@@ -36,7 +36,7 @@ pub fn learn_from_teacher(
 }
 
 /// Equation 18, the learner phase of TLBO: towards a better partner, away from any other. (The paper
-/// leaves equal costs open.)
+/// does not define the case of equal costs.)
 pub fn learn_from_partner(old: &[f64], partner: &[f64], partner_is_better: bool, new: &mut [f64]) {
     let sign = if partner_is_better { 1.0 } else { -1.0 };
     for (new, (old, partner)) in new.iter_mut().zip(old.iter().zip(partner)) {

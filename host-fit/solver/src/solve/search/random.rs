@@ -69,7 +69,7 @@ pub fn stream(seed: u64, generation: usize, phase: Phase, individual: usize) -> 
     SeededSource(Xoshiro256PlusPlus::seed_from_u64(key))
 }
 
-/// The finalizer of SplitMix64: a bijection whose every output bit depends on every input bit.
+/// The finalizer of SplitMix64: a bijection where every output bit depends on every input bit.
 const fn mix(mut word: u64) -> u64 {
     word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -19,7 +19,7 @@ pub struct SearchOptions<'a> {
     /// Individuals that take the first places of the first population, clipped to the bounds. One of
     /// a wrong length is left out. The other individuals are drawn.
     pub first: &'a [Vec<f64>],
-    /// Stop after so many evaluations, the first population included.
+    /// Stop after this number of evaluations, the first population included.
     pub evaluations: Option<usize>,
     /// Stop once the best cost hardly falls.
     pub stall: Option<Stall>,

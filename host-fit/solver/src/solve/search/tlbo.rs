@@ -9,7 +9,7 @@
 //! | `success-ratio` | 23 | 24 | 25 |
 //! | `shtlbo` | 23 | 24 | 27, 28, 29 |
 //!
-//! Choices that the paper leaves open:
+//! Choices where the paper is silent:
 //! - Each phase works on the population at its start: teacher, mean and partners do not change within
 //!   a phase. So all candidates of a phase can be evaluated at once.
 //! - One `rand < p` and one T_F for each individual and phase; r and N(0, 1) for each coordinate. An
@@ -47,7 +47,7 @@ pub struct Population<'f, S> {
 
 impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
     /// The first population (generation 0), evaluated: `first`, clipped to the bounds, then uniform draws
-    /// from the box; `size` in all, at least 2. Of `first`, those of a wrong length are left out.
+    /// from the box; `size` in all, at least 2. Entries of `first` with a wrong length are left out.
     pub fn new(
         mixing: Mixing,
         streams: S,
