@@ -19,6 +19,7 @@ use host_fit::input::shipped::{self, LOG_GZ};
 use host_fit::solver::problem::Problem;
 use host_fit::solver::problem::draw::{Draw, draw_rows};
 use host_fit::solver::problem::model::Model;
+use host_fit::solver::solve::field::parameters::FieldParameters;
 use host_fit::solver::solve::objective::Objective;
 use host_fit::solver::solve::search::cost::CostFunction;
 use host_fit::solver::solve::search::kind::SearchKind;
@@ -175,8 +176,9 @@ impl Run {
             first.or((!is_search && is_near(fitness)).then_some(found.evaluations as f64))
         };
         let (stage, parameters) = (problem.stage, &found.parameters);
-        let calibration = calibration(&dataset.rows, stage, problem.model, parameters);
-        let set = calibration.prepare(&Origin::default()).ok();
+        let parameters = FieldParameters::of_model_31(parameters, stage);
+        let made = calibration(&dataset.rows, stage, problem.model.kind, &parameters);
+        let set = made.and_then(|made| made.prepare(&Origin::default())).ok();
         let rms = set.map(|set| {
             let judged = Decoded::new(&set, dataset).judge(dataset, stage, Zeros::Refit);
             judged.errors.axes.map(|axis| axis.rms * 1e6)

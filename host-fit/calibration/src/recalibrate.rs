@@ -16,7 +16,7 @@
 //! use hallstage_calibration::recalibrate::{Known, recalibrate};
 //! use hallstage_solver::solve::field::update::Change;
 //!
-//! let known = fit.field.as_ref().map(Known::of_fit);
+//! let known = Known::from_fit(&fit);
 //! let created = "2026-11-23".try_into()?;
 //! let new = recalibrate(&fit.set, known.as_ref(), &dataset, &stage, Change::Gains, created)?;
 //! let (change, standard_error) = new.gains[0];
@@ -30,7 +30,7 @@ use described::check_described;
 
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
-use crate::fit::RANGE_MARGIN;
+use crate::fit::{Fit, RANGE_MARGIN, calibration};
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::dataset::Dataset;
@@ -38,7 +38,6 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::field::carry::ServiceVariance;
 use hallstage_solver::solve::field::error::FieldFitError;
-use hallstage_solver::solve::field::fit::FieldFit;
 use hallstage_solver::solve::field::noise::USUAL_DRIFT_MM;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::posterior::Posterior;
@@ -47,7 +46,6 @@ use hallstage_solver::solve::field::update::{Change, update};
 use hallstage_solver::solve::field::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
-use runtime::model::Probes;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
 
@@ -72,14 +70,16 @@ pub struct Known {
 }
 
 impl Known {
-    /// Of a fit.
-    pub fn of_fit(fit: &FieldFit) -> Self {
-        Self {
-            covariance: fit.posterior.covariance.clone(),
-            noise: fit.noise,
-            misfit: fit.score.chi_squared / fit.score.residuals.max(1) as f64,
+    /// Of a fit; `None` of other models than the field model.
+    pub fn from_fit(fit: &Fit) -> Option<Self> {
+        let figures = fit.field.as_ref()?;
+        let score = figures.score;
+        Some(Self {
+            covariance: fit.estimate.posterior.covariance.clone(),
+            noise: figures.noise,
+            misfit: score.chi_squared / score.residuals.max(1) as f64,
             repaired: Vec::new(),
-        }
+        })
     }
 }
 
@@ -306,14 +306,10 @@ pub fn recalibrate(
         validity,
         ..diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted))
     };
-    let axes = judgement.errors.axes;
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
     let fit = FitRecord {
-        rows,
-        train_rows: rows,
-        rms: axes.map(|a| a.rms as f32),
-        peak: axes.map(|a| a.peak as f32),
         forced: old.fit.forced,
+        ..judgement.record(rows)
     };
     let gains = update.gains(&old_parameters);
     let before = |k: usize| {
@@ -346,30 +342,21 @@ fn prepare(
     stage: &Stage,
     origin: &Origin,
 ) -> Result<ParameterSet, RecalibrateError> {
-    let constants = parameters
-        .constants(stage.hall.m_per_count)
-        .ok_or(RecalibrateError::Unusable(ParameterError::SingularPlane))?;
     let mut temperature = old.constants.temperature.rounded::<f64>();
     for (per_mk, beyond) in temperature.per_mk.iter_mut().zip(parameters.gain_per_k) {
         (0..2).for_each(|sensor| per_mk[sensor] += 1e-3 * beyond[sensor]);
     }
-    let calibration = Calibration {
-        model: ModelKind::Field,
-        geometry: parameters.model_31().geometry(),
-        probes: Probes::Field(constants.probes),
-        hall_m_per_code: stage.hall.m_per_count,
+    let made = calibration([], stage, ModelKind::Field, parameters);
+    let made = Calibration {
         hall_window: old.constants.hall_window,
-        capacitive_probes_m: stage.capacitive_probes_m,
-        capacitive_m_per_code: stage.capacitive.m_per_count,
         capacitive_window: old.constants.capacitive_window,
         calibrated_planar: old.constants.calibrated_planar.map(f64::from),
         calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
         sensitivity_min: old.constants.sensitivity_min.into(),
         temperature,
+        ..made.map_err(RecalibrateError::Unusable)?
     };
-    calibration
-        .prepare(origin)
-        .map_err(RecalibrateError::Unusable)
+    made.prepare(origin).map_err(RecalibrateError::Unusable)
 }
 
 #[cfg(test)]

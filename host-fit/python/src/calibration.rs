@@ -250,8 +250,14 @@ impl Calibration {
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (of, fit) = self.fit_or_raise("residuals")?;
         let dataset = fit.rows(&of.log.dataset);
-        let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
-        residuals(py, dataset, &self.designed, &errors, Some(&fit.weights))
+        let errors = fit.errors_by_row(dataset);
+        residuals(
+            py,
+            dataset,
+            &self.designed,
+            &errors,
+            Some(&fit.fitted.weights_by_row(dataset)),
+        )
     }
 
     /// Judges the calibration on another log with reference, by the target's decoder.

@@ -26,7 +26,8 @@ impl Statistics<'_> {
     /// Names and covariance of the parameters that have a standard error.
     fn covariance(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
         if let Some((_, fit)) = self.fit {
-            return Some(fit.covariance());
+            let posterior = &fit.estimate.posterior;
+            return Some((posterior.names(), posterior.covariance.clone()));
         }
         let covariance = self.known?.covariance.clone();
         Some((terms::names(covariance.nrows()), covariance))

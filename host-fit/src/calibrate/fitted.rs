@@ -88,10 +88,7 @@ impl FitOrder {
         let diagnosis = diagnose_log(&log.dataset, stage, fitted.as_ref());
         if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
             fitted = match fitted {
-                Ok(fit) => {
-                    let rows = fit.rows(&log.dataset).clone();
-                    fit.repaired(&rows, stage, repair, predicted)
-                }
+                Ok(fit) => fit.repaired(&log.dataset, stage, repair, predicted),
                 failed => failed,
             };
         }
@@ -152,10 +149,10 @@ impl Outcome {
 
     /// What goes beside the blob: what is known of a field model; `None` of others.
     pub fn known(&self) -> Option<Known> {
-        let field = self.fitted.as_ref().ok()?.field.as_ref()?;
+        let known = Known::from_fit(self.fitted.as_ref().ok()?)?;
         Some(Known {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
-            ..Known::of_fit(field)
+            ..known
         })
     }
 

@@ -73,7 +73,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         ..Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default())
     };
     let judged = fit.map(|fit| {
-        let by_row = (fit.decoded).errors_less(&fit.judgement.zeros, circumstances.dataset);
+        let by_row = fit.errors_by_row(circumstances.dataset);
         let judged = Judged {
             set: &fit.set,
             judgement: &fit.judgement,

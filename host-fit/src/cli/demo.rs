@@ -155,7 +155,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
 
     let mut outputs = Outputs::default();
     posterior_file::add_calibration(&mut outputs, &files[4], &model_31.set, None)?;
-    let known = field.field.as_ref().map(Known::of_fit);
+    let known = Known::from_fit(&field);
     posterior_file::add_calibration(&mut outputs, &files[6], &field.set, known.as_ref())?;
     outputs.commit()?;
     let decoding = DecodeSettings {
@@ -216,8 +216,8 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     ];
     let of_fit = parameters(
         model_31.model,
-        &model_31.solution.parameters,
-        &model_31.standard_error,
+        &model_31.estimate.parameters.model_31(),
+        &model_31.estimate.posterior.standard_errors_31(),
     );
     let mut tables = parameters::tables(&of_fit, &beside);
     for table in &mut tables {

@@ -2,8 +2,8 @@
 
 use super::errors::pose;
 use super::figure::{Figure, Group, figure, group};
-use hallstage_solver::solve::field::fit::FieldFit;
-use hallstage_solver::solve::field::posterior::PoseUncertainty;
+use hallstage_solver::solve::field::fit::FieldFigures;
+use hallstage_solver::solve::field::posterior::{PoseUncertainty, Posterior};
 
 /// Pairs and directions that are reported.
 const PAIRS: usize = 10;
@@ -21,8 +21,7 @@ pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Group 
 /// of a pose by the parameters (the same at every visit) and by the noise of the probes (new in every servo period); the
 /// strongest correlations; and the combinations of parameters that the log determines worst, with their variance over that
 /// of independent parameters and the largest shares in terms of standard errors.
-pub fn figures(fit: &FieldFit) -> Group {
-    let posterior = &fit.posterior;
+pub fn figures(fit: &FieldFigures, posterior: &Posterior) -> Group {
     let pairs = posterior.strongest_correlations(PAIRS);
     let directions = posterior.weakest_directions(DIRECTIONS, PARTS).into_iter();
     let directions = directions.map(|weak| {
@@ -34,14 +33,14 @@ pub fn figures(fit: &FieldFit) -> Group {
     group! {
         "hall_noise" => Figure::List(noise.into()),
         "reference_drift_after_1_s" => pose(fit.noise.drift_mm.map(|mm| mm * 1e-3)),
-        "pose_uncertainty" => predictions(fit),
+        "pose_uncertainty" => predictions(fit, posterior),
         "strongest_correlations" => pairs.iter().map(correlation).collect::<Vec<_>>(),
         "weakest_directions" => directions.collect::<Vec<_>>(),
     }
 }
 
 /// At rest, as a mean over the range of the log, and at its worst corner.
-fn predictions(fit: &FieldFit) -> Vec<Group> {
+fn predictions(fit: &FieldFigures, posterior: &Posterior) -> Vec<Group> {
     let group = |place: &str, systematic: [f64; 3], noise: [f64; 3]| {
         let [systematic, noise] =
             [systematic, noise].map(|variances| pose(variances.map(f64::sqrt)));
@@ -51,12 +50,12 @@ fn predictions(fit: &FieldFit) -> Vec<Group> {
         let diagonal = |m: &nalgebra::Matrix3<f64>| [0, 1, 2].map(|k| m[(k, k)]);
         (diagonal(&at.systematic), diagonal(&at.noise))
     };
-    let rest = fit.posterior.at_pose([0.0; 3], [0.0; 3]);
+    let rest = posterior.at_pose([0.0; 3], [0.0; 3]);
     let corners = (0..64).filter_map(|corner: u32| {
         let side = |axis: usize| if corner >> axis & 1 == 0 { 1.0 } else { -1.0 };
         let planar = [0, 1, 2].map(|k| side(k) * fit.planar_range[k]);
         let vertical = [0, 1, 2].map(|k| side(3 + k) * fit.vertical_range[k]);
-        Some(diagonal(&fit.posterior.at_pose(planar, vertical)?))
+        Some(diagonal(&posterior.at_pose(planar, vertical)?))
     });
     // Axis by axis: the worst corner of X need not be that of Y.
     let worst = corners.reduce(|(a, b), (c, d)| {

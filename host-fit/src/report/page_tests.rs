@@ -82,7 +82,7 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         set: &fit.set,
         judgement: &fit.judgement,
         zeros: Zeros::Refit,
-        by_row: &fit.decoded.errors_less(&fit.judgement.zeros, &dataset),
+        by_row: &fit.errors_by_row(&dataset),
         over_rows: fit.judgement.errors,
     };
     let report = Report::from_judgement(judged, &circumstances);

@@ -209,7 +209,9 @@ impl Report {
     /// | `field` | figures of a fit of the field model; null for other models |
     /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
     pub fn from_fit(fit: &Fit, choice: &Choice, c: &Circumstances) -> Self {
-        let by_row = fit.decoded.errors_less(&fit.judgement.zeros, c.dataset);
+        let by_row = fit.errors_by_row(c.dataset);
+        let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
+        let of_31 = estimate.parameters.model_31();
         let mut report = Self::from_judgement(
             Judged {
                 set: &fit.set,
@@ -221,31 +223,34 @@ impl Report {
             c,
         );
         let (parameters, standard_errors) = match &fit.field {
-            Some(field) => (
+            Some(_) => (
                 field_parameters(
-                    &field.parameters.probes,
-                    Some(&field.posterior.standard_errors()),
+                    &estimate.parameters.probes,
+                    Some(&posterior.standard_errors()),
                 ),
                 "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior",
             ),
             None => (
-                parameters(fit.model, &fit.solution.parameters, &fit.standard_error),
+                parameters(fit.model, &of_31, &posterior.standard_errors_31()),
                 "sandwich over movements, or blocks of 0.5 s where there are fewer than 20; it includes drift, not what the model lacks",
             ),
         };
         report.parameters = parameters;
-        report.warnings.extend(words::messages(&fit.warnings));
-        let places_m = fit.solution.parameters.nearest_places_m(c.stage);
-        let lag = fit.lag.map(|lag| {
+        report
+            .warnings
+            .extend(words::messages(&fit.warnings(c.dataset, c.stage)));
+        let places_m = of_31.nearest_places_m(c.stage);
+        let lag = estimate.lag.map(|lag| {
             let value = figure(lag.value_s * 1e6, "us");
             group! {
                 "value" => value.with_error(Some(lag.standard_error_s * 1e6)),
                 "compensated" => fit.later.is_some(),
             }
         });
-        let correlations: Vec<Group> = fit.correlations.iter().map(field::correlation).collect();
+        let correlations = posterior.correlations_shown();
+        let correlations: Vec<Group> = correlations.iter().map(field::correlation).collect();
         let own = group! {
-            "train_fitness" => bare(fit.train_fitness, "um"),
+            "train_fitness" => bare(fit.train_fitness(c.dataset, c.stage), "um"),
             "parameters" => json!(report.parameters),
             "coordinates" => json!(coordinates(places_m)),
             "warnings" => json!(report.warnings),
@@ -253,15 +258,15 @@ impl Report {
             "solver" => choice.solver,
             "project" => choice.project,
             "seed" => choice.seed,
-            "evaluations" => fit.solution.evaluations,
-            "solver_s" => json!(fit.solution.elapsed.as_secs_f64()),
-            "stopped" => fit.solution.stopped.as_str(),
-            "loss" => fit.loss.name(),
-            "outlier_rows" => fit.left_out.rows,
+            "evaluations" => estimate.evaluations,
+            "solver_s" => json!(estimate.elapsed.as_secs_f64()),
+            "stopped" => estimate.stopped.as_str(),
+            "loss" => fit.fitted.loss.name(),
+            "outlier_rows" => fit.fitted.outliers().count(),
             "standard_errors" => standard_errors,
             "correlations" => correlations,
-            "errors_solver_delta" => errors(&fit.errors_solver_zeros),
-            "field" => fit.field.as_ref().map(field::figures),
+            "errors_solver_delta" => errors(&fit.errors_with_own_delta(c.dataset, c.stage)),
+            "field" => fit.field.as_ref().map(|of| field::figures(of, posterior)),
             "reference_lag" => lag,
         };
         own.0

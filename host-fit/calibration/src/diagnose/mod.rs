@@ -79,7 +79,8 @@ pub fn diagnose_log(
     let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
-    let without_outliers = match fitted.map_or(&[][..], |fit| &fit.outliers) {
+    let outliers = fitted.map_or_else(|_| Vec::new(), |fit| fit.fitted.outliers().collect());
+    let without_outliers = match outliers.as_slice() {
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
@@ -122,8 +123,9 @@ pub fn diagnose_log(
     };
     out.conclude(basis);
     out.validity = field.and_then(|field| {
+        let estimate = fitted.ok().map(|fit| &fit.estimate)?;
         let (mut parameters, mut covariance) =
-            (field.parameters, field.posterior.covariance.clone());
+            (estimate.parameters, estimate.posterior.covariance.clone());
         if let Some(repair) = &out.repair {
             parameters = repair.parameters;
             covariance
@@ -149,11 +151,8 @@ impl Described {
         let of_31 = |parameters| FieldParameters::of_model_31(parameters, stage);
         match fitted {
             Ok(fit) => Self {
-                parameters: match &fit.field {
-                    Some(field) => field.parameters,
-                    None => of_31(&fit.solution.parameters),
-                },
-                lag_s: match (&fit.later, fit.lag) {
+                parameters: fit.estimate.parameters,
+                lag_s: match (&fit.later, fit.estimate.lag) {
                     (None, Some(lag)) => lag.value_s,
                     // It is taken off the rows.
                     _ => 0.0,
@@ -254,9 +253,9 @@ impl Diagnosis {
         let is_late = findings
             .iter()
             .any(|found| found.code() == Code::ReferenceLag);
-        let warnings = fit.warnings.iter();
+        let warnings = fit.warnings(dataset, stage).into_iter();
         let warnings = warnings.filter(|found| !is_late || found.code() != Code::ReferenceLag);
-        findings.extend(warnings.cloned());
+        findings.extend(warnings);
         findings.extend(temperature::findings(fit, dataset, stage));
         findings.extend(range::undeclared(fit, stage));
         let explains = |found: &Finding| {
@@ -264,7 +263,7 @@ impl Diagnosis {
                 || found.code().entry().explains_from == Some(Severity::Note)
         };
         if !findings.iter().any(explains) {
-            findings.extend(of_fit::undescribed(fit, dataset));
+            findings.extend(of_fit::undescribed(fit, dataset, stage));
             let unexplained = are_notes(findings).then(|| of_fit::over_noise(fit, dataset));
             findings.extend(of_fit::not_field(fit, self.predicted.as_ref(), unexplained));
         }

@@ -8,6 +8,7 @@ use crate::judge::verdict;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Place, Severity};
+use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 
 /// A fault in this part of the rows, or one that makes noise or a period so much larger, is worth a warning, ...
@@ -28,7 +29,7 @@ pub(super) const fn severity(share: f64) -> Severity {
 
 /// The rows that count less than half in a fit, where they are more than a few.
 pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
-    let left_out = &fit.left_out;
+    let left_out = fit.fitted.left_out(dataset);
     let severity = severity(left_out.share());
     let (first, last) = left_out.span.filter(|_| severity > Severity::Note)?;
     let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
@@ -83,8 +84,9 @@ pub(super) fn not_field(
 }
 
 /// A fit that leaves most of the motion unexplained and was kept all the same.
-pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
-    let failure = check_described(dataset, &fit.sound, fit.model).err()?;
+pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option<Finding> {
+    let errors = fit.sound_errors(dataset, stage);
+    let failure = check_described(dataset, &errors, fit.model).err()?;
     let FitFailure::NotDescribed {
         model,
         motion,
@@ -109,7 +111,7 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
 
 /// rms errors of a fit over their noise from sample to sample, of the worst axis.
 pub fn over_noise(fit: &Fit, dataset: &Dataset) -> f64 {
-    let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
+    let errors = fit.errors_by_row(dataset);
     let ratios = statistics::over_noise(&errors, &dataset.movements);
     ratios.into_iter().fold(0.0, f64::max)
 }

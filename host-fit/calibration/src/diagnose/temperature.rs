@@ -8,7 +8,6 @@ use crate::judge::verdict::severity;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::posterior::covariance_at;
 use hallstage_solver::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
@@ -28,20 +27,16 @@ const MISSING_MAX: f64 = 0.01;
 /// the log, of which k and h leave a part.
 pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
     let temperature = &fit.calibration.temperature;
-    let (parameters, error_per_k, spans_k) = match &fit.field {
-        Some(field) => (
-            field.parameters,
-            field.warmth.error_per_k,
-            field.warmth.spans_k,
-        ),
+    let parameters = fit.estimate.parameters;
+    let (error_per_k, spans_k) = match &fit.field {
+        Some(field) => (field.warmth.error_per_k, field.warmth.spans_k),
         // Other models take k and h as the stage file expects them.
         None => {
             let expected = stage
                 .temperature
                 .prior_per_k
                 .map(|[_, deviation]| deviation);
-            let parameters = FieldParameters::of_model_31(&fit.solution.parameters, stage);
-            (parameters, [expected; 3], [0.0; 2])
+            ([expected; 3], [0.0; 2])
         }
     };
     let floor = white_noise(&fit.decoded.errors, &dataset.movements);

@@ -2,10 +2,10 @@
 
 use hallstage_input::dataset::Row;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use runtime::model::Probes;
-use runtime::{Calibration, Temperature};
+use runtime::parameters::ParameterError;
+use runtime::{Calibration, ModelKind, Temperature};
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
@@ -13,24 +13,28 @@ pub(crate) const RANGE_MARGIN: f64 = 1.1;
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion
 /// of the rows and a tenth more.
+///
+/// # Errors
+/// [`ParameterError::SingularPlane`], of the field model.
 pub fn calibration<'r>(
     rows: impl IntoIterator<Item = &'r Row>,
     stage: &Stage,
-    model: &Model,
-    parameters: &Parameters,
-) -> Calibration {
-    let mut planar = [0.0f64; 3];
-    let mut vertical = [0.0f64; 3];
-    for row in rows {
-        for axis in 0..3 {
-            planar[axis] = planar[axis].max(row.reference[axis].abs());
-            vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
+    model: ModelKind,
+    parameters: &FieldParameters,
+) -> Result<Calibration, ParameterError> {
+    let (planar, vertical) = reach(rows);
+    let of_31 = parameters.model_31();
+    let probes = match model {
+        ModelKind::Field => {
+            let constants = parameters.constants(stage.hall.m_per_count);
+            Probes::Field(constants.ok_or(ParameterError::SingularPlane)?.probes)
         }
-    }
-    Calibration {
-        model: model.kind,
-        geometry: parameters.geometry(),
-        probes: Probes::Linear(parameters.sensitivity()),
+        _ => Probes::Linear(of_31.sensitivity()),
+    };
+    Ok(Calibration {
+        model,
+        geometry: of_31.geometry(),
+        probes,
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,
         capacitive_probes_m: stage.capacitive_probes_m,
@@ -40,5 +44,18 @@ pub fn calibration<'r>(
         calibrated_vertical: vertical.map(|x| x * RANGE_MARGIN),
         sensitivity_min: Calibration::SENSITIVITY_MIN,
         temperature: Temperature::NONE,
+    })
+}
+
+/// Largest magnitudes of X, Y, Rz and of Z, Rx, Ry in some rows: m, rad.
+pub(super) fn reach<'r>(rows: impl IntoIterator<Item = &'r Row>) -> ([f64; 3], [f64; 3]) {
+    let mut planar = [0.0f64; 3];
+    let mut vertical = [0.0f64; 3];
+    for row in rows {
+        for axis in 0..3 {
+            planar[axis] = planar[axis].max(row.reference[axis].abs());
+            vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
+        }
     }
+    (planar, vertical)
 }

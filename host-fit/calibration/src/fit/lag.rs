@@ -1,7 +1,8 @@
 //! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference is
 //! read later by the lag, and the fit is made again, until nothing of the lag is left.
 
-use super::{Fit, FitError, FitSettings, ModelChoice, fit_once, warning};
+use super::job::fit_once;
+use super::{Fit, FitError, FitSettings, ModelChoice, warning};
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
@@ -48,7 +49,7 @@ pub(super) fn without_lag(
 }
 
 fn is_clear(found: &Fit, stage: &Stage) -> bool {
-    (found.lag.as_ref())
+    (found.estimate.lag.as_ref())
         .is_some_and(|lag| warning::late_reference(lag, stage.servo_period_s).is_some())
 }
 
@@ -61,7 +62,7 @@ fn again(
 ) -> Result<Fit, FitError> {
     let mut total_s = 0.0;
     for _ in 0..ROUNDS_MAX {
-        let Some(lag) = found.lag else { break };
+        let Some(lag) = found.estimate.lag else { break };
         if lag.value_s.abs() < LEFT * lag.standard_error_s {
             break;
         }
@@ -70,7 +71,7 @@ fn again(
         found = fit_once(&later, stage, settings)?;
         found.later = Some(later);
     }
-    if let Some(lag) = &mut found.lag {
+    if let Some(lag) = &mut found.estimate.lag {
         lag.value_s += total_s;
     }
     Ok(found)

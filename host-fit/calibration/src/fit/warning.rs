@@ -1,15 +1,16 @@
 //! What a user should know of a fit that is good nevertheless.
 
+use super::Fit;
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::AxisError;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind};
-use hallstage_solver::problem::Problem;
+use hallstage_input::stage::Stage;
 use hallstage_solver::problem::terms::shown;
 use hallstage_solver::problem::zero_deviation::ZeroDeviation;
-use hallstage_solver::solve::Solution;
+use hallstage_solver::solve::least_squares::solve::at_limit;
 
 /// Warn of a lag from this part of a servo period on, ...
 const LAG_MIN: f64 = 0.1;
@@ -47,36 +48,40 @@ pub(super) fn late_reference(lag: &ReferenceLag, period_s: f64) -> Option<Findin
     (lag_s.abs() > least).then(|| Finding::new(kind).with_channel(Channel::Beams))
 }
 
-/// All warnings of a fit but that of a lag.
-pub(super) fn warnings(
-    dataset: &Dataset,
-    selected: &[usize],
-    problem: &Problem,
-    solution: &Solution,
-    judgement: &Judgement,
-) -> Vec<Finding> {
-    let mut warnings = Vec::new();
-    for id in &solution.at_limit {
-        let value = solution.parameters.values[id.index];
-        let unit = id.term.unit;
-        let kind = Kind::AtLimit {
-            parameter: id.name(),
-            shown: shown(value, unit),
-            value,
-            unit,
-        };
-        warnings.push(Finding::new(kind).with_channel(Channel::SINGLE[id.probe]));
+impl Fit {
+    /// What the user should know, of a fit to the rows of a dataset.
+    pub fn warnings(&self, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+        let mut warnings = Vec::new();
+        let parameters = self.estimate.parameters.model_31();
+        let at_limit = at_limit(stage, self.model, &parameters);
+        for id in &at_limit {
+            let value = parameters.values[id.index];
+            let unit = id.term.unit;
+            let kind = Kind::AtLimit {
+                parameter: id.name(),
+                shown: shown(value, unit),
+                value,
+                unit,
+            };
+            warnings.push(Finding::new(kind).with_channel(Channel::SINGLE[id.probe]));
+        }
+        let vertical = at_limit.iter().filter(|id| id.is_slope()).count();
+        if vertical > 1 {
+            let kind = Kind::VerticalAtLimit {
+                parameters: vertical,
+            };
+            warnings.push(Finding::new(kind));
+        }
+        warnings.extend(wild_row(dataset, &self.judgement));
+        if self.model.has_zero_deviation {
+            warnings.extend(missed(dataset, &self.fitted.numbers));
+        }
+        let judgement = &self.judgement;
+        warnings.extend(counted(&judgement.zeros, judgement.undecoded));
+        let lag = self.estimate.lag.as_ref();
+        warnings.extend(lag.and_then(|lag| late_reference(lag, stage.servo_period_s)));
+        warnings
     }
-    let parameters = solution.at_limit.iter().filter(|id| id.is_slope()).count();
-    if parameters > 1 {
-        warnings.push(Finding::new(Kind::VerticalAtLimit { parameters }));
-    }
-    warnings.extend(wild_row(dataset, judgement));
-    if problem.model.has_zero_deviation {
-        warnings.extend(missed(dataset, selected));
-    }
-    warnings.extend(counted(&judgement.zeros, judgement.undecoded));
-    warnings
 }
 
 /// Movements without a row in the draw.

@@ -5,7 +5,6 @@ use crate::judge::uncertainty::Uncertainty;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
-use hallstage_solver::problem::Problem;
 use hallstage_solver::problem::model::{GAIN_TERMS, Model, ParameterId};
 use hallstage_solver::problem::parameters::{Parameters, THETA, search_box};
 use hallstage_solver::problem::terms::Motion;
@@ -221,16 +220,17 @@ fn tolerable(id: &ParameterId, vertical_span: [f64; 3]) -> f64 {
 /// # Errors
 /// [`FitFailure::NotDetermined`] with every such parameter.
 pub fn check_determined(
-    problem: &Problem<'_>,
+    stage: &Stage,
+    model: &'static Model,
     parameters: &Parameters,
     uncertainty: &Uncertainty,
     vertical_span: [f64; 3],
 ) -> Result<(), FitFailure> {
     let misalignment_rad = parameters.geometry().misalignment_rad;
-    let ranges = search_box(problem.stage, problem.model, misalignment_rad);
+    let ranges = search_box(stage, model, misalignment_rad);
     let mut what = Vec::new();
     let mut remedies: Vec<&str> = Vec::new();
-    for id in problem.model.free() {
+    for id in model.free() {
         let open = uncertainty.undetermined.contains(&id);
         let error = uncertainty.motion_error[id.index];
         let useless = ERROR_TO_RANGE_MAX * ranges[id.index].width();
@@ -246,7 +246,7 @@ pub fn check_determined(
                 id.term.unit
             )
         });
-        let remedy = id.seen_in(problem.stage).recording();
+        let remedy = id.seen_in(stage).recording();
         if !remedies.contains(&remedy) {
             remedies.push(remedy);
         }

@@ -6,6 +6,7 @@ use hallstage_input::dataset::{Movement, Row};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::parameters::Parameters;
 use hallstage_solver::problem::zero_deviation::ZeroDeviation;
+use runtime::parameters::FitRecord;
 
 /// The figures of one parameter set on the rows of one or more logs.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +28,18 @@ pub struct Judgement {
 }
 
 impl Judgement {
+    /// What a blob records of it, of a fit that used so many rows.
+    pub fn record(&self, train_rows: u32) -> FitRecord {
+        let axes = self.errors.axes;
+        FitRecord {
+            rows: u32::try_from(self.rows()).unwrap_or(u32::MAX),
+            train_rows,
+            rms: axes.map(|axis| axis.rms as f32),
+            peak: axes.map(|axis| axis.peak as f32),
+            forced: false,
+        }
+    }
+
     /// Rows of all logs, those included that could not be decoded.
     pub const fn rows(&self) -> usize {
         self.errors.rows + self.undecoded

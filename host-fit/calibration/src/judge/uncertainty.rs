@@ -6,9 +6,13 @@
 //! half a second within them. Where independence would give the larger figure that one is taken,
 //! so that a chance cancellation within few clusters promises nothing.
 
+use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::{COUNT, ParameterId};
 use hallstage_solver::problem::parameters::Parameters;
 use hallstage_solver::problem::{Group, Problem};
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::Posterior;
+use hallstage_solver::solve::field::terms::PER_PROBE;
 use hallstage_solver::solve::gauss_newton::{Equations, Normal, Point};
 use hallstage_solver::solve::least_squares::rows::{COLUMNS, Decoder};
 use hallstage_solver::solve::least_squares::solve::free;
@@ -26,24 +30,18 @@ const BLOCK_S: f64 = 0.5;
 /// How well the log determines the parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uncertainty {
-    /// Standard error of each parameter, SI; `None` for one that the model fixes, that the log does not determine at all,
-    /// and for all where there are fewer clusters than parameters.
-    pub standard_error: [Option<f64>; COUNT],
-    /// The same if rows were independent: what the log's motion alone allows, whatever the model
+    /// The parameters that have a standard error, ascending. The model does not fit the others, or the log
+    /// does not determine them; none has one where there are fewer clusters than parameters.
+    pub determined: Vec<usize>,
+    /// Their covariance in this order, SI.
+    pub covariance: DMatrix<f64>,
+    /// Standard errors if rows were independent: what the log's motion alone allows, whatever the model
     /// leaves unexplained. Zero where there is none.
     pub motion_error: [f64; COUNT],
     /// Parameters that the log does not determine: no motion shows them, or only in combination
     /// with others.
     pub undetermined: Vec<ParameterId>,
-    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_SHOWN`], either
-    /// way, with their correlation.
-    pub correlations: Vec<(String, String, f64)>,
-    /// Covariance of the parameters that have a standard error, in their order, SI.
-    pub covariance: DMatrix<f64>,
 }
-
-/// Correlations above this are shown: the parameters stand in for each other.
-pub const CORRELATION_SHOWN: f64 = 0.95;
 
 /// Smallest eigenvalue of the scaled curvature that still counts as information.
 const EIGENVALUE_MIN: f64 = 1e-10;
@@ -80,9 +78,8 @@ pub fn uncertainty(problem: &Problem, parameters: &Parameters) -> Option<Uncerta
         }
     }
     let covariance = inverse * clustered * inverse;
-    let names: Vec<(usize, String)> = (problem.model.free())
-        .filter(|id| standard_error[id.index].is_some())
-        .map(|id| (id.index, id.name()))
+    let determined: Vec<usize> = (0..COUNT)
+        .filter(|&k| standard_error[k].is_some())
         .collect();
     // Of an exact fit there is none.
     let correlation = |a: usize, b: usize| {
@@ -92,30 +89,37 @@ pub fn uncertainty(problem: &Problem, parameters: &Parameters) -> Option<Uncerta
             false => 0.0,
         }
     };
-    let mut correlations = Vec::new();
-    for (j, (b, name_b)) in names.iter().enumerate() {
-        for (a, name_a) in &names[..j] {
-            let correlation = correlation(*a, *b);
-            if correlation.abs() > CORRELATION_SHOWN {
-                correlations.push((name_a.clone(), name_b.clone(), correlation));
-            }
-        }
-    }
     // With the standard errors on its diagonal, whichever way they were found.
-    let error = |k: usize| standard_error[names[k].0].unwrap_or_default();
-    let covariance = DMatrix::from_fn(names.len(), names.len(), |i, j| match i == j {
+    let error = |k: usize| standard_error[determined[k]].unwrap_or_default();
+    let n = determined.len();
+    let covariance = DMatrix::from_fn(n, n, |i, j| match i == j {
         true => error(i).powi(2),
-        false => error(i) * error(j) * correlation(names[i].0, names[j].0),
+        false => error(i) * error(j) * correlation(determined[i], determined[j]),
     });
     Some(Uncertainty {
-        correlations,
+        determined,
         covariance,
-        standard_error,
         motion_error,
         undetermined: (problem.model.free())
             .filter(|id| undetermined.contains(&id.index))
             .collect(),
     })
+}
+
+impl Uncertainty {
+    /// The posterior of parameters.
+    pub fn posterior(&self, parameters: &Parameters, stage: &Stage) -> Posterior {
+        let parameters = FieldParameters::of_model_31(parameters, stage);
+        let place = |&index: &usize| index % 3 * PER_PROBE + index / 3;
+        let determined = self.determined.iter().map(place).collect();
+        Posterior::of_some(determined, self.covariance.clone(), &parameters)
+    }
+
+    /// Standard error of a parameter, SI.
+    pub fn standard_error(&self, index: usize) -> Option<f64> {
+        let place = self.determined.binary_search(&index).ok()?;
+        Some(self.covariance[(place, place)].sqrt())
+    }
 }
 
 /// The normal equations of a problem at parameters.

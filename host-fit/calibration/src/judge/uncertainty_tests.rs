@@ -28,7 +28,7 @@ fn standard_errors_of_the_shipped_log_are_those_of_an_independent_computation() 
         .expect("a solution");
     let found = uncertainty(&problem, &solution.parameters).expect("evaluated");
     for (id, expected) in model.parameters().zip(EXPECTED) {
-        let found = found.standard_error[id.index].expect("determined");
+        let found = found.standard_error(id.index).expect("determined");
         assert!(
             (found - expected).abs() < 1e-3 * expected,
             "{}: {found:e} {expected:e}",
@@ -65,7 +65,7 @@ fn standard_errors_match_the_spread_over_repeated_logs() {
             let deviation = solution.parameters.values[k] - truth.values[k];
             sums[k][0] += deviation;
             sums[k][1] += deviation * deviation;
-            claimed[k] += errors.standard_error[k].expect("determined") / logs as f64;
+            claimed[k] += errors.standard_error(k).expect("determined") / logs as f64;
         }
     }
     for k in 0..18 {

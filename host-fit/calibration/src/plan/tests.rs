@@ -205,7 +205,7 @@ fn the_forecast_is_what_fits_to_simulated_logs_give() {
         };
         let trajectory = PLAN.run.trajectory(STAGE.servo_period_s);
         let fit = fitted(&recorded(trajectory, &SensorErrors::USUAL));
-        let own = &fit.verdict.service;
+        let own = &fit.figures.verdict.service;
         for axis in 0..3 {
             let ratio = (own.systematic[axis] / own.noise[axis])
                 / (forecast.systematic[axis] / forecast.noise[axis]);

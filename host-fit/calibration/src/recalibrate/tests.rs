@@ -61,7 +61,7 @@ impl Old {
         let dataset = log(&stage, &assembly, sines(8.0, RUN), SEED);
         let fit = fit(&dataset, &stage, &settings).expect("a fit");
         Self {
-            known: Known::of_fit(&fit.field.expect("of the field model")),
+            known: Known::from_fit(&fit).expect("of the field model"),
             set: fit.set,
             stage,
             assembly,

@@ -4,7 +4,7 @@
 //! from each movement, until it hardly improves; what it found is then a start of the
 //! least-squares fit on all rows. So the result is the least-squares optimum whatever the seed, and the search guards against a start that leads nowhere.
 
-use super::least_squares::solve::{self as least_squares, at_limit};
+use super::least_squares::solve as least_squares;
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
@@ -143,7 +143,6 @@ pub fn solution_of(
             "{}; {} of {} evaluations had no cost",
             found.reason, found.nan_costs, found.evaluations
         ),
-        at_limit: at_limit(problem, &parameters),
     })
 }
 

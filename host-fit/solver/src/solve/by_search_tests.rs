@@ -1,5 +1,6 @@
 use super::*;
 use crate::solve::Solver;
+use crate::solve::least_squares::solve::at_limit;
 use crate::solve::objective::sample_for_tests::{dataset, problem, stage};
 use runtime::ModelKind;
 
@@ -78,6 +79,8 @@ fn a_gain_outside_its_box_is_kept_and_named() {
         .solve(&problem, &options(Projection::Linear, 300))
         .expect("a fit");
     assert!((found.parameters.eta()[0] - 0.87).abs() < 0.01);
-    let names = found.at_limit.iter().map(|id| id.name());
+    let names = at_limit(problem.stage, problem.model, &found.parameters)
+        .into_iter()
+        .map(|id| id.name());
     assert_eq!(names.collect::<Vec<_>>(), ["eta_a"]);
 }

@@ -40,7 +40,6 @@ pub mod robust;
 pub mod search;
 
 use crate::problem::Problem;
-use crate::problem::model::ParameterId;
 use crate::problem::parameters::Parameters;
 use hallstage_input::watch::Watch;
 use search::kind::SearchKind;
@@ -173,8 +172,6 @@ pub struct Solution {
     pub elapsed: Duration,
     /// Why it stopped, for the report.
     pub stopped: String,
-    /// Parameters that stand at an end of their search range.
-    pub at_limit: Vec<ParameterId>,
 }
 
 /// Why a solver gave nothing.

@@ -134,7 +134,7 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
         sample.beams_nm[0] += if is_second { 3000 } else { 0 };
     });
     let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
-    let parameters = fitted.field.expect("the field model").parameters;
+    let parameters = fitted.estimate.parameters;
     let log = Log::new(&dataset, &stage, &probes(&parameters));
     let first = Estimate::first(&log, &parameters, &[]);
     let estimate = first.and_then(|first| first.faultless(&log)).expect("one");
@@ -222,7 +222,7 @@ fn a_gain_that_changes_is_named_with_channel_onset_size_and_cost_and_taken_off()
         assert_eq!(diagnosis.verdict, Some(Verdict::Good));
         let repair = diagnosis.repair.expect("a repair");
         let eta = |parameters: &FieldParameters| parameters.model_31().eta()[1];
-        let before = &sound.field.as_ref().expect("the field model").parameters;
+        let before = &sound.estimate.parameters;
         let change = 100.0 * (eta(&repair.parameters) / eta(before) - 1.0);
         assert!((change - percent).abs() < 0.05, "{change}");
     }

@@ -43,26 +43,33 @@ pub struct FieldFit {
     pub parameters: FieldParameters,
     /// How well the log determines them.
     pub posterior: Posterior,
-    /// The noise of the log.
-    pub noise: Noise,
     /// Lag of the reference behind the probes, s: positive where it shows an earlier pose.
     pub lag_s: f64,
     /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
     pub offsets_mm: Vec<[f64; 3]>,
+    /// The weights of the rows used.
+    pub weights: Vec<f64>,
+    /// Gauss-Newton steps.
+    pub iterations: u32,
+    /// What the log says besides.
+    pub figures: FieldFigures,
+}
+
+/// What a log says beside the parameters of the field model.
+#[derive(Clone, Debug)]
+pub struct FieldFigures {
+    /// The noise of the log.
+    pub noise: Noise,
     /// The terms of the log-posterior at its maximum.
     pub score: Score,
     /// Largest magnitudes of X, Y, Rz (m, m, rad) in the log, each movement's middle taken off.
     pub planar_range: [f64; 3],
     /// Largest magnitudes of Z, Rx, Ry in the log: m, rad, rad.
     pub vertical_range: [f64; 3],
-    /// Whether it is better taken than Model (31).
+    /// Whether the field model is better taken than Model (31).
     pub verdict: Verdict,
     /// k and h with their standard errors.
     pub warmth: Warmth,
-    /// The weights of the rows used.
-    pub weights: Vec<f64>,
-    /// Gauss-Newton steps.
-    pub iterations: u32,
 }
 
 /// -2 times the log-posterior is their sum, but for a constant.
@@ -229,9 +236,8 @@ impl WhiteFit {
             |block: &Range<usize>| rows.rows[block.clone()].iter().map(|row| row.weight).sum();
         let weights = rows.blocks.iter().map(weight);
         let counted = weights.filter(|sum: &f64| *sum >= HALF).count();
-        Ok(FieldFit {
+        let figures = FieldFigures {
             verdict: self.verdict(stage, &posterior),
-            posterior,
             warmth,
             score: Score {
                 chi_squared: normal.chi_squared(),
@@ -239,14 +245,18 @@ impl WhiteFit {
                 prior: self.unknowns.prior_squares(&self.at.values),
                 residuals: 3 * counted.saturating_sub(rows.movements.len()),
             },
+            noise: self.noise,
+            planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
+            vertical_range: rows.vertical_range,
+        };
+        Ok(FieldFit {
+            figures,
+            posterior,
             parameters: FieldParameters {
                 gain_per_k: [[0.0; 2]; 3],
                 ..self.parameters()
             },
-            noise: self.noise,
             lag_s: self.lag_s(),
-            planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
-            vertical_range: rows.vertical_range,
             offsets_mm: self.at.offsets,
             weights: self.weights,
             iterations: self.iterations,

@@ -2,7 +2,7 @@
 
 use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
-use super::terms::{CARRY, COUNT, PER_PROBE, name};
+use super::terms::{self, CARRY, COUNT, PER_PROBE, name};
 use super::whiten::Noise;
 use crate::problem::model;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
@@ -12,12 +12,17 @@ use runtime::matrix::{from_rows, inverse, to_rows};
 /// each fitted to 30 s without noise and drift; 16 to 46 nm.
 pub const FORM_MM: f64 = 25e-6;
 
+/// Correlations above this are shown: the parameters stand in for each other.
+pub const CORRELATION_SHOWN: f64 = 0.95;
+
 /// The posterior of a fit: normal, with the parameters as its mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// Covariance of the 81 parameters, in their order and units, and then, where the stage has sensors
-    /// of temperature, of (k, h) of A, B, C, 1/K.
+    /// of temperature, of (k, h) of A, B, C, 1/K. Of Models (12) to (31) only that of `determined`.
     pub covariance: DMatrix<f64>,
+    /// Which parameters these are, by their places among the 81 and k and h.
+    pub determined: Vec<usize>,
     /// Standard error of the lag of the reference, s; `None` where the log shows nothing of it.
     pub lag_error_s: Option<f64>,
     parameters: FieldParameters,
@@ -106,12 +111,13 @@ impl Posterior {
     }
 
     /// Of parameters with this covariance, for probes with this noise.
-    pub const fn of_parameters(
+    pub fn of_parameters(
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
         noise: &Noise,
     ) -> Self {
         Self {
+            determined: (0..covariance.nrows()).collect(),
             covariance,
             lag_error_s: None,
             parameters: *parameters,
@@ -119,11 +125,60 @@ impl Posterior {
         }
     }
 
+    /// Of some of the parameters.
+    pub const fn of_some(
+        determined: Vec<usize>,
+        covariance: DMatrix<f64>,
+        parameters: &FieldParameters,
+    ) -> Self {
+        Self {
+            covariance,
+            determined,
+            lag_error_s: None,
+            parameters: *parameters,
+            white_mm: [0.0; 3],
+        }
+    }
+
+    /// The same about other parameters with a covariance of their own; that of k and h stays.
+    #[must_use]
+    pub fn with_parameters(&self, parameters: &FieldParameters, covariance: &DMatrix<f64>) -> Self {
+        let (of_parameters, all) = (covariance.nrows(), self.covariance.nrows());
+        let mut whole = covariance.clone().resize(all, all, 0.0);
+        for i in of_parameters..all {
+            for j in of_parameters..all {
+                whole[(i, j)] = self.covariance[(i, j)];
+            }
+        }
+        Self {
+            covariance: whole,
+            parameters: *parameters,
+            ..self.clone()
+        }
+    }
+
+    /// The names of the rows of the covariance.
+    pub fn names(&self) -> Vec<String> {
+        let all = terms::names(usize::MAX);
+        let named = self.determined.iter().map(|place| all[*place].clone());
+        named.collect()
+    }
+
+    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_SHOWN`] either way, the
+    /// strongest first, with their correlation.
+    pub fn correlations_shown(&self) -> Vec<(String, String, f64)> {
+        let pairs = self.strongest_correlations(usize::MAX).into_iter();
+        pairs
+            .take_while(|pair| pair.2.abs() > CORRELATION_SHOWN)
+            .collect()
+    }
+
     /// The same with k and h, whose covariance with themselves and with the parameters is in
     /// `with_lag`: that of all unknowns.
     #[must_use]
     pub(super) fn with_warmth(mut self, with_lag: &DMatrix<f64>) -> Self {
         self.covariance = with_lag.clone().remove_row(COUNT).remove_column(COUNT);
+        self.determined = (0..self.covariance.nrows()).collect();
         self
     }
 
@@ -135,23 +190,32 @@ impl Posterior {
     /// Those of the parameters that Model (31) has too, in the order and the units of
     /// [`Parameters`](crate::problem::parameters::Parameters).
     pub fn standard_errors_31(&self) -> [Option<f64>; model::COUNT] {
-        let errors = self.standard_errors();
-        std::array::from_fn(|k| (k < 3 * CARRY).then(|| errors[k % 3 * PER_PROBE + k / 3]))
+        std::array::from_fn(|k| {
+            let place = k % 3 * PER_PROBE + k / 3;
+            let row = self.determined.iter().position(|known| *known == place)?;
+            (k < 3 * CARRY).then(|| self.covariance[(row, row)].sqrt())
+        })
     }
 
-    /// The correlation of two parameters.
+    /// The correlation of two parameters; none where an exact fit left no error.
     pub fn correlation(&self, i: usize, j: usize) -> f64 {
-        self.covariance[(i, j)] / (self.covariance[(i, i)] * self.covariance[(j, j)]).sqrt()
+        let product = self.covariance[(i, i)] * self.covariance[(j, j)];
+        match product > 0.0 {
+            true => self.covariance[(i, j)] / product.sqrt(),
+            false => 0.0,
+        }
     }
 
     /// The `count` pairs of parameters that are most strongly correlated, the strongest first.
     pub fn strongest_correlations(&self, count: usize) -> Vec<(String, String, f64)> {
-        let mut pairs: Vec<(usize, usize)> = (0..COUNT)
+        let names = self.names();
+        let mut pairs: Vec<(usize, usize)> = (0..names.len().min(COUNT))
             .flat_map(|i| (0..i).map(move |j| (j, i)))
             .collect();
         let strength = |&(i, j): &(usize, usize)| self.correlation(i, j).abs();
         pairs.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-        let named = |(i, j)| (name(i), name(j), self.correlation(i, j));
+        let named =
+            |(i, j): (usize, usize)| (names[i].clone(), names[j].clone(), self.correlation(i, j));
         pairs.into_iter().take(count).map(named).collect()
     }
 

@@ -53,12 +53,12 @@ fn eight_seconds_give_the_parameters_within_their_standard_errors() {
     }
     let mean_square = normalized.iter().map(|x| x * x).sum::<f64>() / COUNT as f64;
     assert!((0.3..2.0).contains(&mean_square), "{mean_square}");
-    let chi_squared = fit.score.chi_squared / fit.score.residuals as f64;
+    let chi_squared = fit.figures.score.chi_squared / fit.figures.score.residuals as f64;
     assert!((0.85..1.15).contains(&chi_squared), "{chi_squared}");
-    for ratio in fit.verdict.service.ratios() {
+    for ratio in fit.figures.verdict.service.ratios() {
         assert!(ratio < 1.02, "{ratio}");
     }
-    assert!(fit.verdict.field, "{}", fit.verdict);
+    assert!(fit.figures.verdict.field, "{}", fit.figures.verdict);
     assert!(fit.iterations <= 8, "{}", fit.iterations);
 }
 
@@ -69,10 +69,16 @@ fn the_noise_of_the_probes_and_the_walk_of_the_reference_are_separated() {
         drift: [0.3e-6, 0.1e-6, 0.5e-6],
         ..Run::EIGHT_SECONDS
     });
-    for white in fit.noise.white_mm {
+    for white in fit.figures.noise.white_mm {
         assert!((white / 0.5e-3 - 1.0).abs() < 0.05, "{white}");
     }
-    for (drift, truth) in fit.noise.drift_mm.into_iter().zip([0.3e-3, 0.1e-3, 0.5e-3]) {
+    for (drift, truth) in fit
+        .figures
+        .noise
+        .drift_mm
+        .into_iter()
+        .zip([0.3e-3, 0.1e-3, 0.5e-3])
+    {
         assert!((drift / truth - 1.0).abs() < 0.5, "{drift} {truth}");
     }
 }
@@ -111,7 +117,7 @@ fn the_fit_is_the_same_on_one_thread_and_on_many() {
     let (one, many) = (on(1), on(3));
     assert_eq!(one.parameters, many.parameters);
     assert_eq!(one.posterior, many.posterior);
-    assert_eq!(one.score, many.score);
+    assert_eq!(one.figures.score, many.figures.score);
 }
 
 /// Where the vertical pose stands still in each movement, E and the resets are the same thing.
@@ -134,7 +140,7 @@ fn a_log_of_still_heights_cannot_carry_the_model() {
 fn a_stage_that_is_model_31_keeps_it() {
     let truth = FieldParameters::of_model_31(&parameters().model_31(), &stage());
     let fit = fit(&Run::EIGHT_SECONDS.dataset(&truth)).expect("a fit");
-    assert!(!fit.verdict.field, "{}", fit.verdict);
+    assert!(!fit.figures.verdict.field, "{}", fit.figures.verdict);
 }
 
 /// Two runs, the second at a mount that is 5 K warmer, of magnets whose k differ.
@@ -169,7 +175,7 @@ fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
 #[test]
 fn a_cold_and_a_warm_log_tell_k_within_its_standard_error() {
     let truth = [-0.9e-3, -1.3e-3, -1.6e-3];
-    let warmth = fit(&cold_and_warm(truth, 2)).expect("a fit").warmth;
+    let warmth = fit(&cold_and_warm(truth, 2)).expect("a fit").figures.warmth;
     assert_eq!(warmth.temperature.zero_mc[0], 22_500);
     for (probe, truth) in truth.into_iter().enumerate() {
         // k counts from the gain at T0, 2.5 K above the cold log.
@@ -193,7 +199,7 @@ fn logs_at_nearly_one_temperature_leave_k_as_expected() {
             *mount_mc = 20_000 + (*mount_mc - 20_000) / part;
         }
         dataset.compensate_as_expected(&stage().temperature);
-        let warmth = fit(&dataset).expect("a fit").warmth;
+        let warmth = fit(&dataset).expect("a fit").figures.warmth;
         assert_eq!(warmth.spans_k, [0.0; 2]);
         for (per_mk, error) in warmth.temperature.per_mk.iter().zip(warmth.error_per_k) {
             assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");

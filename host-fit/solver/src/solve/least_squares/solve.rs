@@ -3,12 +3,12 @@
 use super::gains::{Point, parameters_of};
 use super::rows::{COLUMNS, Decoder};
 use crate::problem::Problem;
-use crate::problem::model::{COUNT, ParameterId};
+use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::{Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
 use crate::solve::{Solution, SolveError};
-use hallstage_input::stage::Range;
+use hallstage_input::stage::{Range, Stage};
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::time::Duration;
 
@@ -126,7 +126,6 @@ pub(super) fn fit(
             true => "converged".to_owned(),
             false => "no further step lowers the cost".to_owned(),
         },
-        at_limit: at_limit(problem, &parameters),
     })
 }
 
@@ -146,14 +145,14 @@ pub fn free(problem: &Problem) -> Vec<usize> {
 }
 
 /// The free parameters that stand at an end of their range or beyond it.
-pub fn at_limit(problem: &Problem, parameters: &Parameters) -> Vec<ParameterId> {
-    let ranges = ranges(problem, parameters.geometry().misalignment_rad, true);
+pub fn at_limit(stage: &Stage, model: &'static Model, parameters: &Parameters) -> Vec<ParameterId> {
+    let ranges = search_box(stage, model, parameters.geometry().misalignment_rad);
     let at_end = |id: &ParameterId| {
         let (range, value) = (ranges[id.index], parameters.values[id.index]);
         let edge = 1e-9 * range.width();
         range.width() > 0.0 && (value <= range.low + edge || value >= range.high - edge)
     };
-    problem.model.free().filter(at_end).collect()
+    model.free().filter(at_end).collect()
 }
 
 /// eta, angle and lever arm of each probe by a linear regression of its signal on the reference, each

@@ -2,6 +2,7 @@
 
 use super::gains::{parameters_of, point_of};
 use super::rows::COLUMNS;
+use super::solve::at_limit;
 use super::solve::{fit, solve};
 use crate::problem::Problem;
 use crate::problem::model::{COUNT, Model};
@@ -120,7 +121,10 @@ fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends
     let problem = model_31(&dataset, &narrow);
     let free = solve(&problem, &[]).expect("a fit");
     assert!((free.parameters.eta()[0] - 0.8671).abs() < 1e-3);
-    let names: Vec<String> = free.at_limit.iter().map(|id| id.name()).collect();
+    let names: Vec<String> = at_limit(problem.stage, problem.model, &free.parameters)
+        .into_iter()
+        .map(|id| id.name())
+        .collect();
     assert_eq!(names, ["eta_a"]);
     let within = fit(&problem, &[free.parameters], true).expect("a fit");
     assert_eq!(within.parameters.eta()[0], 0.85);

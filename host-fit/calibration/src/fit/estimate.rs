@@ -1,0 +1,29 @@
+//! What a fit, a search or a repair finds: parameters, and how well the log determines them.
+
+use crate::judge::lag::ReferenceLag;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::Posterior;
+use runtime::Temperature;
+use std::time::Duration;
+
+/// Parameters with their posterior. All other figures of a [`Fit`](super::Fit) follow from these.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// The parameters; E and p are zero in Models (12) to (31).
+    pub parameters: FieldParameters,
+    /// k, h and T0.
+    pub temperature: Temperature<f64>,
+    /// How well the log determines the parameters.
+    pub posterior: Posterior,
+    /// By how much the reference lags behind the probes; `None` where nothing in the log shows it.
+    pub lag: Option<ReferenceLag>,
+    /// The solver's own zero deviation of each movement, m, by the rows that were fitted; `None` where it
+    /// has none of its own.
+    pub delta_m: Option<Vec<[f64; 3]>>,
+    /// Evaluations of the cost.
+    pub evaluations: u64,
+    /// Time that the solver took.
+    pub elapsed: Duration,
+    /// Why the solver stopped, for the report.
+    pub stopped: String,
+}
