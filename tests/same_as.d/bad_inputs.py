@@ -165,8 +165,6 @@ def bad_inputs(inputs):
         "no output": ["decode", blob, *sound],
         "another stage": ["live", blob, *any_bus, "--serial", "other"],
         "no such bus, live": ["live", blob, *any_bus],
-        "no such bus, replay": ["replay", *sound, *any_bus],
-        "no rate": ["replay", *sound, *any_bus, "--rate", "0"],
         "address not aligned": ["export", blob, "--address", "0x08000001", "--out", "x.hex"],
         "no such slot": ["export", blob, "--slot", "2", "--out", "x.hex"],
         "slot and address": ["export", blob, "--slot", "0", "--address", "0", "--out", "x.hex"],

@@ -1,11 +1,9 @@
-//! The stage on a CAN bus: decoded as it comes, recorded, played from a log, made into a log, and
-//! given new parameters.
+//! The stage on a CAN bus: decodes and records it, makes a log of a record, and updates a controller.
 
 mod address;
 pub mod import;
 pub mod live;
 pub mod recorder;
-pub mod replay;
 pub mod update;
 
 pub use address::{AddressError, BusAddress};

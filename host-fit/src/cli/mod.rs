@@ -23,7 +23,6 @@ mod progress;
 mod read_back;
 mod recalibrate;
 mod record;
-mod replay;
 mod report;
 mod rezero;
 mod shell;
@@ -32,7 +31,6 @@ mod terminal;
 mod threads;
 mod update;
 
-use crate::bus::replay::ReplaySettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
 use crate::output::{blob_file, check_writable, is_standard, is_standard_output, keep_apart};
@@ -115,8 +113,6 @@ commands! {
     Live(live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs) => record::run,
-    /// Play a log onto a CAN bus as the sensor node would send it (Linux).
-    Replay(ReplaySettings) => replay::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
     Identify(identify::IdentifyArgs) => identify::run,
     /// Store new parameters in a controller over a CAN bus (Linux).
