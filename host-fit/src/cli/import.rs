@@ -33,25 +33,19 @@ pub(super) struct ImportArgs {
     /// period if not given.
     #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     tolerance_us: Option<u32>,
-    /// Time of the bus less time of the reference, us.
-    #[arg(
-        long,
-        value_name = "US",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    offset_us: f64,
-    /// Find the offset between the clocks, and how much faster one runs, by the motion that both
-    /// saw.
-    #[arg(long, conflicts_with = "offset_us")]
+    /// Start of the search: time of the bus less time of the reference, us. Without it, both records start
+    /// together.
+    #[arg(long, value_name = "US", allow_negative_numbers = true)]
+    offset_us: Option<f64>,
+    /// For scripts of earlier versions: the offset is always estimated.
+    #[arg(long, hide = true)]
     estimate_offset: bool,
-    /// How far from "both records start together" the offset is looked for, s.
+    /// How far from its start the offset is searched, s.
     #[arg(
         long,
         value_name = "SECONDS",
         default_value_t = 2.0,
-        value_parser = search_seconds,
-        requires = "estimate_offset"
+        value_parser = search_seconds
     )]
     search_s: f64,
     /// Only frames of this interface, where the record holds several; can0@5 for those of node 5.
@@ -65,7 +59,7 @@ pub(super) struct ImportArgs {
     skip_bad_lines: bool,
 }
 
-/// Further than an hour apart, two records are dated by hand: `--offset-us`.
+/// For records further apart than an hour, `--offset-us` gives the start.
 fn search_seconds(text: &str) -> Result<f64, String> {
     between(text, 0.0, 3600.0, "a number of seconds")
 }
@@ -79,7 +73,6 @@ impl ImportArgs {
             out: self.out.clone(),
             tolerance_us: self.tolerance_us,
             offset_us: self.offset_us,
-            estimate_offset: self.estimate_offset,
             search_s: self.search_s,
             interface: self.interface.clone(),
             layout: self.layout,

@@ -153,8 +153,8 @@ fn wrong_usage_ends_with_status_2() {
         "import bus.log log.csv --out log.csv",
         "import log.csv ifm.csv --out ./log.csv",
         "live --can no-such-bus log.csv --record log.csv",
-        "import bus.log log.csv --out x.csv --estimate-offset --search-s=nan",
-        "import bus.log log.csv --out x.csv --estimate-offset --search-s=3601",
+        "import bus.log log.csv --out x.csv --search-s=nan",
+        "import bus.log log.csv --out x.csv --search-s=3601",
     ] {
         assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments}");
     }

@@ -78,8 +78,7 @@ fn reference(fast: f64) -> String {
 /// Largest distance from the codes to those of the reference beside them, m; and the report. Each row has
 /// the temperatures of its tick.
 fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
-    let (distance_m, rows, report) =
-        try_import(controller, interferometer, None).expect("imported");
+    let (distance_m, rows, report) = try_import(controller, interferometer).expect("imported");
     let differ = rows.iter().filter(|row| {
         let t_s = 1e-6 * row.t_us as f64 / (1.0 + interferometer);
         let n = ((t_s - 0.0003) * (1.0 + controller) / 0.002).round() as u32;
@@ -90,11 +89,9 @@ fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
     (distance_m, report)
 }
 
-/// With the offset that is given, us, or found.
 fn try_import(
     controller: f64,
     interferometer: f64,
-    offset_us: Option<f64>,
 ) -> Result<(f64, Vec<Row>, ImportReport), ImportError> {
     let stage = hallstage_input::shipped::STAGE_TOML
         .replace("m_per_count = 6.25e-8 ", "m_per_count = 2.44140625e-10 ")
@@ -104,10 +101,7 @@ fn try_import(
         + "\n[temperature]\nmount = \"mount_c\"\nbody = \"body_c\"\nunit = \"C\"\n";
     let import = files(&candump(controller), &reference(interferometer));
     std::fs::write(&import.settings.stage, stage).expect("written");
-    let import = match offset_us {
-        None => import.with(|settings| settings.search_s = 0.1),
-        Some(offset_us) => import.given(offset_us),
-    };
+    let import = import.with(|settings| settings.search_s = 0.1);
     let report = run(&import.settings)?;
     let rows = import.log().rows;
     let distance = rows.iter().flat_map(|row| {
@@ -134,24 +128,9 @@ fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
 
 #[test]
 fn clocks_too_far_apart_in_speed_are_refused() {
-    let refused = try_import(0.0, 1000e-6, None).expect_err("refused");
+    let refused = try_import(0.0, 1000e-6).expect_err("refused");
     assert!(
         matches!(refused, ImportError::UnsteadyClocks { .. }),
         "{refused}"
     );
-}
-
-/// The offset is that in the middle of the record; how far the clocks drift apart, the motion shows.
-#[test]
-fn a_given_offset_is_refused_unless_it_is_that_in_the_middle() {
-    let refused = try_import(0.0, 100e-6, Some(600.0)).expect_err("refused");
-    assert!(
-        matches!(refused, ImportError::WrongOffset { .. }),
-        "{refused}"
-    );
-    let (_, _, report) = try_import(0.0, 0.0, Some(600.0)).expect("imported");
-    let apart_us = report.offset.seen.apart_us.expect("as given");
-    assert!(apart_us.abs() < 800.0, "{apart_us}");
-    let (distance_m, ..) = try_import(0.0, 100e-6, Some(600.0 - 57.0 * 100.0)).expect("imported");
-    assert!(distance_m < 3e-6, "{distance_m}");
 }

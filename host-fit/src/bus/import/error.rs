@@ -113,16 +113,16 @@ pub enum ImportError {
         "most of the two records do not belong together: {} of {} ticks have a reference, which covers {:.1} s of \
          the reference's {:.1} s. On its clock the ticks lie from {:.0} to {:.0} us, its samples from {:.0} to {:.0} us; {} ticks \
          are outside its time, {} between movements, {} further than --tolerance-us (one servo period, if it is not given) from \
-         a sample. Name records of one run, check the offset, or let --estimate-offset find it; cut what one record has more than \
-         the other; log the reference in every servo period, or give a larger --tolerance-us",
+         a sample. Name records of one run; cut what one record has more than the other; log the reference in every servo period, or give a larger --tolerance-us",
         .0.rows, .0.ticks, .0.covered_s, .0.reference_s, .0.bus_us[0], .0.bus_us[1], .0.reference_us[0], .0.reference_us[1],
         .0.outside, .0.between_movements, .0.too_far
     )]
     Unpaired(JoinCounts),
-    /// At the best offset, or at the one given, the two do not agree.
+    /// The reference explains too little of the motion at every offset.
     #[error(
-        "no offset between the clocks: at the one that was given, or at the best one with --estimate-offset, the reference explains \
-         {percent:.0} % of the Hall signals' motion, less than {least_percent:.0} %; are both of the same run? A larger --search-s may help"
+        "no offset between the clocks within --search-s of its start: at the best one the reference explains {percent:.0} % of the \
+         Hall signals' motion, less than {least_percent:.0} %. Are both records of the same run? Then search further (--search-s), or \
+         start elsewhere (--offset-us)"
     )]
     NoOffset {
         /// Share that is explained.
@@ -151,15 +151,6 @@ pub enum ImportError {
         standard_error_us: f64,
         /// The most it may be, us.
         most_us: f64,
-    },
-    /// The motion shows another offset than the one that was given.
-    #[error(
-        "the given offset is wrong: the motion that both records saw asks for {apart_us:.0} us more in the middle of the record; use \
-         --estimate-offset"
-    )]
-    WrongOffset {
-        /// What the motion asks for beyond it, us.
-        apart_us: f64,
     },
     /// One movement does not agree with the offset of the others.
     #[error(

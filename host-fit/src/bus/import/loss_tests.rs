@@ -1,6 +1,6 @@
 //! Frames that the recorder lost or received late: whatever is missing, each row is that of its tick.
 
-use super::tests::{Import, OFFSET_US, files, hall, record, reference};
+use super::tests::{Import, files, hall, record, reference};
 use super::*;
 use hal_adapters::can::Coded;
 use std::f64::consts::TAU;
@@ -55,7 +55,7 @@ fn frames_that_come_late_all_at_once_with_or_without_a_loss_shift_no_row() {
                     (!is_lost).then(|| jittered_us(if is_late { end } else { n }))
                 });
                 let what = format!("{late} late, {lost} lost, from {start} on");
-                let import = files(&bus, &reference()).given(OFFSET_US + 150.0);
+                let import = files(&bus, &reference());
                 assert!(check(&import, &what) > 650, "{what}");
             }
         }
@@ -69,7 +69,7 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
         candump(|n, coded| (!is_time(coded)).then(|| jittered_us(n))),
         candump(|n, _| (n < 60).then(|| jittered_us(n))),
     ] {
-        let import = files(&bus, &reference()).given(OFFSET_US);
+        let import = files(&bus, &reference());
         import.refused(|error| matches!(error, ImportError::NoTicks { .. }));
     }
 }

@@ -1,11 +1,11 @@
-//! The offset between the clocks and how much faster one runs, by the motion that both saw.
+//! The offset between the clocks and their difference in speed, from the motion that both records saw.
 //!
-//! A grid of one servo period finds the offset by correlation: at the right one each Hall signal is
-//! about what the designed probe would read at the reference pose, times a sensitivity. (A
-//! fit by all three axes of the reference would also explain a run shifted by a whole movement:
-//! each movement moves one axis only, and some matrix turns any axis into any other.) From the
-//! minute with most motion, offset and rate are then followed to the ends of the record: they are the
-//! lag of the reference and its rate in the fit of the field model.
+//! A grid of one servo period around the start finds the offset by correlation: at the right offset each Hall
+//! signal is about a sensitivity times the reading of the designed probe at the reference pose. (A fit by all
+//! three axes of the reference would also explain a run shifted by a whole movement: each movement moves one
+//! axis only, and some matrix turns any axis into any other.) From the minute with the most motion, offset
+//! and rate are followed to the ends of the record: they are the lag of the reference and its rate in the fit
+//! of the field model.
 
 mod rows;
 
@@ -20,45 +20,33 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::Row;
 use serde::Serialize;
 
-/// The offset between the clocks.
+/// The estimated offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Offset {
     /// Time of the recorder less time of the reference in the middle of the record, us.
     #[serde(rename = "in_the_middle_us")]
     pub us: f64,
-    /// How much faster the clock of the sensor node runs than that of the reference, as a part of one.
+    /// Relative speed of the sensor node's clock to the clock of the reference, less one.
     #[serde(rename = "node_clock_faster_by")]
     pub rate: f64,
-    /// What the motion that both saw shows.
-    #[serde(flatten)]
-    pub seen: Seen,
-}
-
-/// What the motion that both records saw shows of an offset.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Seen {
     /// Share of the Hall signals' motion that the reference explains.
     #[serde(rename = "share_of_motion_explained")]
     pub explained: f64,
-    /// Over how many ticks.
+    /// Ticks of the fit.
     pub ticks: usize,
-    /// Standard error of the offset that the motion shows, at the end of the record where it is
-    /// larger, us.
+    /// Standard error of the offset, at the end of the record where it is larger, us.
     pub standard_error_us: f64,
-    /// For an offset that was given: the one that the motion shows less the one given, us.
-    #[serde(rename = "motion_asks_for_more_us")]
-    pub apart_us: Option<f64>,
 }
 
 /// The clocks of node and reference.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clocks {
     /// Time of the node less time of the reference in the middle, us.
-    pub(super) us: f64,
-    /// How much faster the node's runs, as a part of one.
-    pub(super) rate: f64,
+    us: f64,
+    /// Relative speed of the node's clock to the clock of the reference, less one.
+    rate: f64,
     /// The middle, us on the clock of the node.
-    pub(super) middle_us: f64,
+    middle_us: f64,
 }
 
 impl Clocks {
@@ -67,8 +55,8 @@ impl Clocks {
         node_us - self.us - self.rate * (node_us - self.middle_us)
     }
 
-    /// The same with another middle.
-    pub(super) fn about(self, middle_us: f64) -> Self {
+    /// The same clocks with another middle.
+    fn about(self, middle_us: f64) -> Self {
         Self {
             us: self.us + self.rate * (middle_us - self.middle_us),
             middle_us,
@@ -82,6 +70,8 @@ pub(super) struct Records<'r> {
     ticks: &'r [Tick],
     /// When the record starts, us on the clock of the node.
     start_us: f64,
+    /// Time of the recorder less time of the node, us.
+    recorder_us: f64,
     samples: &'r [Sample],
     stage: &'r Stage,
     period_us: f64,
@@ -89,45 +79,44 @@ pub(super) struct Records<'r> {
     scale: [f64; 3],
     /// Whether the reference has beams.
     is_beams: bool,
-    /// What the designed probes read of X, Y, Rz.
+    /// Readings of the designed probes per X, Y, Rz.
     plane: Matrix3<f64>,
 }
 
-/// Ticks of the correlation, and of a fit, at most.
+/// Most ticks of the correlation, and of a fit.
 const COARSE_TICKS: usize = 2_000;
 const FIT_TICKS: usize = 10_000;
 
-/// The first part of a record that is fitted: a wrong rate has moved little in it, us.
+/// The first stretch of the record that is fitted, us: a wrong rate moves little in it.
 const STRETCH_US: f64 = 60e6;
 
-/// Steps for one stretch of the record, at most, and the last one in standard errors.
+/// Most steps for one stretch, and the size of the last one in standard errors.
 const STEPS: usize = 4;
 const SETTLED: f64 = 0.1;
 
-/// Share that must be explained: signals of another run reach a third by chance.
+/// Least share of the motion that must be explained: signals of another run reach a third by chance.
 const EXPLAINED_MIN: f64 = 0.6;
 
-/// Crystals differ by less; more means that the two records do not belong together.
+/// Crystals differ by less. A larger difference means that the records do not belong together.
 const RATE_MAX: f64 = 500e-6;
 
-/// A clock that was set shows in some ten seconds of a movement, us.
+/// Length of the pieces in which a step of a clock shows, us.
 const PIECE_US: f64 = 1e7;
 
-/// The motion of such a piece, as a share of the mean motion of the record, from which on as much of it
-/// must be explained.
+/// Least motion of such a piece, relative to the mean motion of the record, to judge its explained share.
 const MOTION_MIN: f64 = 0.02;
 
-/// How far its own offset may be off, in standard errors.
+/// How far the offset of a piece may be off, in standard errors.
 const STANDARD_ERRORS: f64 = 5.0;
 
-/// How far the correlation may be wrong, in servo periods.
+/// Largest error of the correlation, in servo periods.
 const COARSE_PERIODS_MAX: f64 = 2.0;
 
-/// Largest standard error of an offset, in servo periods.
+/// Largest standard error of the offset, in servo periods.
 const STANDARD_ERROR_PERIODS_MAX: f64 = 0.1;
 
-/// How far a given offset, or that of a piece of the record, may be from the one that the motion
-/// shows, in servo periods: the time that frames take is part of the latter.
+/// How far the offset of a piece may be off beyond its standard errors, in servo periods: it includes the
+/// time that frames take.
 const APART_PERIODS_MAX: f64 = 0.5;
 
 impl<'r> Records<'r> {
@@ -135,6 +124,7 @@ impl<'r> Records<'r> {
         Self {
             ticks: &run.ticks,
             start_us: -run.since_start_us,
+            recorder_us: run.recorder_less_node_us(),
             samples: &reference.samples,
             period_us: stage.servo_period_s * 1e6,
             scale: reference.quantities.map(|q| stage.log.column(q).scale),
@@ -144,22 +134,25 @@ impl<'r> Records<'r> {
         }
     }
 
-    /// The middle of the record, us on the clock of the node.
-    pub(super) fn middle_us(&self) -> f64 {
-        middle_us(self.ticks)
-    }
-
-    /// Finds the offset within `search_us` of where both records start together.
+    /// Finds the offset within `search_us` of a start: `offset_us`, recorder less reference, or the offset at
+    /// which both records start together.
     ///
     /// # Errors
     /// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`.
-    pub(super) fn estimate(&self, search_us: f64) -> Result<(Clocks, Seen), ImportError> {
-        let start = self.coarse(search_us);
-        let (found, seen) = self.follow(start)?;
+    pub(super) fn estimate(
+        &self,
+        offset_us: Option<f64>,
+        search_us: f64,
+    ) -> Result<(Clocks, Offset), ImportError> {
+        let first_us = self.samples.first().map_or(0.0, |sample| sample.t_us);
+        let together_us = self.start_us - first_us;
+        let start_us = offset_us.map_or(together_us, |us| us - self.recorder_us);
+        let start = self.coarse(start_us, search_us);
+        let (found, offset) = self.follow(start)?;
         let most_us = STANDARD_ERROR_PERIODS_MAX * self.period_us;
-        if seen.standard_error_us > most_us {
+        if offset.standard_error_us > most_us {
             return Err(ImportError::UncertainOffset {
-                standard_error_us: seen.standard_error_us,
+                standard_error_us: offset.standard_error_us,
                 most_us,
             });
         }
@@ -167,58 +160,31 @@ impl<'r> Records<'r> {
         if moved_us.abs() > COARSE_PERIODS_MAX * self.period_us {
             return Err(UNSTEADY);
         }
-        Ok((found, seen))
+        Ok((found, offset))
     }
 
-    /// Checks an offset that was given for the middle of the record against the motion, which
-    /// adds the rate.
-    ///
-    /// # Errors
-    /// `NoOffset`, `UnsteadyClocks`, `WrongOffset`, `Astray`.
-    pub(super) fn checked(&self, given: Clocks) -> Result<(Clocks, Seen), ImportError> {
-        let (found, seen) = self.follow(given.about(middle_us(self.liveliest())))?;
-        let apart_us = found.us - given.us;
-        let most_us = APART_PERIODS_MAX * self.period_us + 3.0 * seen.standard_error_us;
-        if apart_us.abs() > most_us {
-            return Err(ImportError::WrongOffset { apart_us });
-        }
-        let clocks = Clocks {
-            us: given.us,
-            ..found
-        };
-        let apart_us = Some(apart_us);
-        Ok((clocks, Seen { apart_us, ..seen }))
-    }
-
-    /// The minute with most motion.
+    /// The minute with the most motion.
     fn liveliest(&self) -> &'r [Tick] {
         let ticks = (STRETCH_US / self.period_us).max(1.0);
         let parts = (self.ticks.len() as f64 / ticks).ceil().max(1.0) as usize;
         let minutes = self.ticks.chunks(self.ticks.len().div_ceil(parts).max(1));
-        let motion = |ticks: &&[Tick]| {
-            let mean = |k: usize| {
-                let sum: f64 = ticks.iter().map(|tick| f64::from(tick.codes.hall[k])).sum();
-                sum / ticks.len() as f64
-            };
-            let means = [0, 1, 2].map(mean);
-            let of_tick = |tick: &Tick| -> f64 {
-                let of_probe = |k: usize| (f64::from(tick.codes.hall[k]) - means[k]).powi(2);
-                [0, 1, 2].map(of_probe).iter().sum()
-            };
-            ticks.iter().map(of_tick).sum::<f64>()
+        let variance = |ticks: &[Tick], k: usize| {
+            let codes = || ticks.iter().map(|tick| f64::from(tick.codes.hall[k]));
+            let mean = codes().sum::<f64>() / ticks.len() as f64;
+            codes().map(|code| (code - mean).powi(2)).sum::<f64>()
         };
+        let motion = |ticks: &&[Tick]| [0, 1, 2].map(|k| variance(ticks, k)).iter().sum::<f64>();
         let most = minutes.max_by(|a, b| motion(a).total_cmp(&motion(b)));
         most.unwrap_or_default()
     }
 
     /// The best offset on a grid of one servo period.
-    fn coarse(&self, search_us: f64) -> Clocks {
+    fn coarse(&self, start_us: f64, search_us: f64) -> Clocks {
         let minute = self.liveliest();
         let points: Vec<Tick> = thinned(minute, COARSE_TICKS).collect();
-        let first_us = self.samples.first().map_or(0.0, |sample| sample.t_us);
         let steps = (search_us / self.period_us).ceil().clamp(1.0, 1e6) as i32;
         let clocks = |step: i32| Clocks {
-            us: self.start_us - first_us + f64::from(step) * self.period_us,
+            us: start_us + f64::from(step) * self.period_us,
             rate: 0.0,
             middle_us: middle_us(minute),
         };
@@ -233,7 +199,7 @@ impl<'r> Records<'r> {
     ///
     /// # Errors
     /// `NoOffset`, `UnsteadyClocks`, `Astray`.
-    fn follow(&self, start: Clocks) -> Result<(Clocks, Seen), ImportError> {
+    fn follow(&self, start: Clocks) -> Result<(Clocks, Offset), ImportError> {
         let far_us = |tick: Option<&Tick>| tick.map_or(0.0, |t| (t.t_us - start.middle_us).abs());
         let half_us = far_us(self.ticks.first()).max(far_us(self.ticks.last()));
         let mut clocks = start;
@@ -262,19 +228,21 @@ impl<'r> Records<'r> {
             if stretch_us > half_us {
                 let rows = self.rows(&points, &clocks);
                 self.check_pieces(&alignment, &rows, &clocks, lag.excess)?;
-                let seen = Seen {
+                let clocks = clocks.about(middle_us(self.ticks));
+                let offset = Offset {
+                    us: clocks.us + self.recorder_us,
+                    rate: clocks.rate,
                     explained: share.max(self.share(&rows)?),
                     ticks: rows.len(),
                     standard_error_us: 1e6 * lag.standard_errors_s[0].max(lag.standard_errors_s[1]),
-                    apart_us: None,
                 };
-                return Ok((clocks.about(self.middle_us()), seen));
+                return Ok((clocks, offset));
             }
             stretch_us *= 4.0;
         }
     }
 
-    /// One step of the fit, by which the clocks move.
+    /// One step of the fit, which moves the clocks.
     fn step(
         &self,
         alignment: &mut Alignment,
@@ -284,13 +252,13 @@ impl<'r> Records<'r> {
         let lag = alignment
             .step(&self.field_rows(rows, clocks))
             .ok_or(UNSTEADY)?;
-        // What lags is read too early.
+        // A reference that lags is read too early.
         clocks.us -= 1e6 * lag.value_s;
         clocks.rate -= lag.rate;
         Ok(lag)
     }
 
-    /// Every piece of the record must agree with the offset of all.
+    /// Checks that every piece of the record agrees with the offset of the whole.
     ///
     /// # Errors
     /// `Astray`.
@@ -330,7 +298,7 @@ fn middle_us(ticks: &[Tick]) -> f64 {
     ends.map_or(0.0, |(first, last)| (first.t_us + last.t_us) / 2.0)
 }
 
-/// At most `most` of the ticks from all over them, in steps that no motion repeats in.
+/// At most `most` of the ticks, spread evenly at irregular distances, so that no motion repeats with them.
 fn thinned(ticks: &[Tick], most: usize) -> impl Iterator<Item = Tick> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let step = (ticks.len() as f64 / most as f64).max(1.0);

@@ -106,8 +106,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
         stage: path("stage.toml"),
         out: path("log.csv"),
         tolerance_us: None,
-        offset_us: 0.0,
-        estimate_offset: true,
+        offset_us: None,
         search_s: 0.4,
         interface: None,
         layout: None,
@@ -125,13 +124,6 @@ impl Import {
     pub(super) fn with(mut self, change: impl FnOnce(&mut ImportSettings)) -> Self {
         change(&mut self.settings);
         self
-    }
-
-    /// With this offset, us.
-    pub(super) fn given(self, offset_us: f64) -> Self {
-        self.with(|settings| {
-            (settings.estimate_offset, settings.offset_us) = (false, offset_us);
-        })
     }
 
     pub(super) fn run(&self) -> ImportReport {
@@ -164,8 +156,8 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
     // belongs to the offset.
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
-    assert!(report.offset.seen.explained > 0.999);
-    let standard_error_us = report.offset.seen.standard_error_us;
+    assert!(report.offset.explained > 0.999);
+    let standard_error_us = report.offset.standard_error_us;
     assert!(
         (0.01..20.0).contains(&standard_error_us),
         "{standard_error_us}"
@@ -199,6 +191,21 @@ fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
     assert!(report.join.rows > 445);
 }
 
+#[test]
+fn a_given_offset_is_the_start_of_the_search() {
+    let import = |start_us| {
+        let import = files(&candump(|_, _| false), &reference());
+        import.with(|settings| {
+            (settings.search_s, settings.offset_us) = (0.05, Some(OFFSET_US + start_us));
+        })
+    };
+    for start_us in [-40_000.0, 40_000.0] {
+        let found_us = import(start_us).run().offset.us - OFFSET_US;
+        assert!((-160.0..160.0).contains(&found_us), "{found_us}");
+    }
+    import(-1e6).refused(|error| matches!(error, ImportError::NoOffset { .. }));
+}
+
 /// The motion is 212 um rms: noise of 40 um leaves 96 % of it explained, but tells the offset to no
 /// better than a quarter of a servo period.
 #[test]
@@ -216,7 +223,7 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
         let import = files(&bus, &reference());
         let outcome = run(&import.settings);
         assert_eq!(outcome.is_ok(), import.settings.out.exists());
-        outcome.map(|report| report.offset.seen.standard_error_us)
+        outcome.map(|report| report.offset.standard_error_us)
     };
     let little_us = standard_error_us(64.0).expect("4 um of noise");
     assert!((30.0..120.0).contains(&little_us), "{little_us}");
@@ -229,10 +236,10 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
     }
 }
 
-/// On a circle a shift in time is a rotation of the probes: it leaves the offset open, which is another
-/// fault than records of different runs. An offset that is given is taken.
+/// On a circle a shift in time is a rotation of the probes, so the offset is uncertain; records of different
+/// runs are another fault.
 #[test]
-fn of_a_circle_the_offset_is_uncertain_and_one_that_is_given_is_taken() {
+fn on_a_circle_the_offset_is_uncertain() {
     let circle = |t_us: f64| {
         let (sin, cos) = (TAU * t_us / MOVEMENT_US).sin_cos();
         [300e-6 * sin, 300e-6 * cos]
@@ -249,8 +256,6 @@ fn of_a_circle_the_offset_is_uncertain_and_one_that_is_given_is_taken() {
     }
     let import = files(&bus, &ifm).with(|settings| settings.search_s = 0.1);
     import.refused(|error| matches!(error, ImportError::UncertainOffset { .. }));
-    let seen = import.given(OFFSET_US).run().offset.seen;
-    assert!(seen.standard_error_us > 1_000.0, "{seen:?}");
 }
 
 #[test]
@@ -314,8 +319,6 @@ fn records_of_different_runs_and_clocks_are_refused() {
     }
     let import = files(&candump(|_, _| false), &other);
     import.refused(|error| matches!(error, ImportError::NoOffset { .. }));
-    let given = import.given(0.0);
-    given.refused(|error| matches!(error, ImportError::Unpaired { .. }));
 }
 
 /// It is read as every log is, without the columns of the probes.

@@ -19,5 +19,5 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
 fuzz_target!(|reference: &[u8]| {
     FOLDER.write("reference", reference);
     FOLDER.import(&[]);
-    FOLDER.import(&["--estimate-offset", "--search-s", "1"]);
+    FOLDER.import(&["--search-s", "1"]);
 });
