@@ -31,7 +31,6 @@ use node_clock::Tick;
 use offset::{Offset, Records};
 use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// The settings of an import.
@@ -65,7 +64,7 @@ pub struct ImportSettings {
 }
 
 /// The result of an import.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ImportReport {
     /// Frames and ticks of the record.
     pub bus: BusCounts,
@@ -76,7 +75,6 @@ pub struct ImportReport {
     /// Rows of the log.
     pub join: JoinCounts,
     /// The record has temperatures, but the stage names no columns for them: the log leaves them out.
-    #[serde(skip)]
     pub temperatures_left_out: bool,
 }
 

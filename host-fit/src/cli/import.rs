@@ -106,7 +106,7 @@ fn figures(report: &ImportReport) -> Group {
         join,
         ..
     } = report;
-    let (health, seen) = (&bus.health, &offset.seen);
+    let health = &bus.health;
     let us = |us: f64| figure(us, "us");
     let ends = |ends: [f64; 2]| ends.into_iter().map(us).collect::<Figure>();
     group! {
@@ -138,10 +138,9 @@ fn figures(report: &ImportReport) -> Group {
         "offset" => group! {
             "in the middle" => us(offset.us),
             "node clock faster by" => offset.rate,
-            "share of motion explained" => seen.explained,
-            "ticks" => seen.ticks,
-            "standard error" => us(seen.standard_error_us),
-            "motion asks for more" => seen.apart_us.map(us),
+            "share of motion explained" => offset.explained,
+            "ticks" => offset.ticks,
+            "standard error" => us(offset.standard_error_us),
         },
         "join" => group! {
             "ticks" => join.ticks,

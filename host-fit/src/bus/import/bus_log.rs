@@ -3,7 +3,6 @@
 use hal_adapters::can::{BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
-use serde::{Serialize, Serializer};
 
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +23,7 @@ impl BusTick {
 }
 
 /// What a record held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusCounts {
     /// Lines with a frame.
     pub frames: usize,
@@ -46,21 +45,7 @@ pub struct BusCounts {
     /// Places where ticks are missing.
     pub gaps: usize,
     /// What the receiver noticed.
-    #[serde(serialize_with = "health")]
     pub health: BusHealth,
-}
-
-fn health<S: Serializer>(health: &BusHealth, to: S) -> Result<S::Ok, S::Error> {
-    let counts = [
-        ("lost", health.lost),
-        ("repeated", health.repeated),
-        ("out of sequence", health.wrong_sequence),
-        ("damaged", health.wrong_check),
-        ("of wrong length", health.wrong_length),
-        ("late", health.late),
-        ("incomplete ticks", health.incomplete),
-    ];
-    to.collect_map(counts)
 }
 
 /// A recorded tick may have been delayed as a whole: what is missing shows by the counters.

@@ -5,7 +5,6 @@ use super::ImportError;
 use super::node_clock::Tick;
 use super::reference::Sample;
 use runtime::RawFrame;
-use serde::Serialize;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +20,7 @@ pub struct JoinedRow {
 }
 
 /// How ticks and reference went together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JoinCounts {
     /// Ticks.
     pub ticks: usize,

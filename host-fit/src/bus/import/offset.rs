@@ -18,19 +18,15 @@ use hallstage_solver::solve::field::clocks::{Alignment, Lag};
 use nalgebra::Matrix3;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::Row;
-use serde::Serialize;
 
 /// The estimated offset between the clocks.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
     /// Time of the recorder less time of the reference in the middle of the record, us.
-    #[serde(rename = "in_the_middle_us")]
     pub us: f64,
     /// Relative speed of the sensor node's clock to the clock of the reference, less one.
-    #[serde(rename = "node_clock_faster_by")]
     pub rate: f64,
     /// Share of the Hall signals' motion that the reference explains.
-    #[serde(rename = "share_of_motion_explained")]
     pub explained: f64,
     /// Ticks of the fit.
     pub ticks: usize,

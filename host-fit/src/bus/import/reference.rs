@@ -11,7 +11,6 @@ use hallstage_input::log::time::Clock;
 use hallstage_input::log::{LogError, LogProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
-use serde::Serialize;
 use std::path::Path;
 
 /// One sample of the reference.
@@ -26,7 +25,7 @@ pub struct Sample {
 }
 
 /// What a log of the reference held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReferenceCounts {
     /// Rows.
     pub rows: usize,
