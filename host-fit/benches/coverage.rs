@@ -1,9 +1,9 @@
-//! How often the truth lies in the 95 % intervals of a fit of the field model, over simulated logs.
+//! The share of 95 % intervals of the field model that hold the truth, over simulated logs.
 //!
-//! `cargo bench -p host-fit --bench coverage [-- LOGS]`: about 200 logs by default, minutes.
+//! `cargo bench -p host-fit --bench coverage [-- LOGS]`: 200 logs by default, minutes.
 //!
-//! Parameters have a truth only in logs that the field model itself makes; poses have one in logs
-//! of a stage made of physics as well, where the model is not exact.
+//! Parameters have a true value only in logs made by the field model. Poses have one also in logs of
+//! simulated stages, where the model is not exact.
 
 mod common;
 
@@ -13,7 +13,7 @@ use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::pose::StagePose;
-use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
+use host_fit::simulate::protocol::{Protocol, Run};
 use host_fit::simulate::random::{Purpose, Stream};
 use host_fit::simulate::sensors::SensorErrors;
 use host_fit::solver::problem::Problem;
@@ -25,58 +25,23 @@ use host_fit::solver::solve::field::probe::probes;
 use host_fit::solver::solve::field::terms::TERMS;
 use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, RawFrame, VerticalPose};
-use std::f64::consts::TAU;
 
 const PERIOD_S: f64 = 0.002;
-/// Every this many rows of a service log a pose is judged.
+/// One pose in this number of rows of a service log is judged.
 const POSE_STRIDE: usize = 40;
 
-/// What is run to be fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Motion {
-    EightSeconds,
-    ThirtySeconds,
-    Combined,
-}
-
-impl Motion {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::EightSeconds => "8 s",
-            Self::ThirtySeconds => "30 s",
-            Self::Combined => "combined",
-        }
-    }
-
-    fn run(self, seed: u64) -> Run {
-        match self {
-            Self::EightSeconds => Run::planned(sines(&RUN_8)),
-            Self::ThirtySeconds => Run::planned(sines(&RUN_30)),
-            Self::Combined => Protocol::Combined.run(PERIOD_S, seed),
-        }
-    }
-}
-
-/// A run whose ends rise as 3 x^2 - 2 x^3: those of plans rise more smoothly.
-fn sines(run: &PlannedRun) -> Trajectory {
-    let pose = |row: u32| {
-        let t_s = f64::from(row) * PERIOD_S;
-        let end = (t_s.min(run.seconds - t_s) / run.taper_s).clamp(0.0, 1.0);
-        let taper = end * end * (3.0 - 2.0 * end);
-        let at = |k: usize| {
-            let phase = TAU * run.cycles[k] * t_s / run.seconds + 1.7 * k as f64;
-            run.amplitudes[k] * taper * libm::sin(phase)
-        };
-        StagePose {
-            planar: [at(0), at(1), at(2)],
-            vertical: [at(3), at(4), at(5)],
-        }
+/// The runs of a share of the logs.
+fn runs(logs: u64) -> impl Iterator<Item = (u64, Run)> {
+    let planned = |run: &PlannedRun| Run::planned(run.trajectory(PERIOD_S));
+    let run = move |seed: u64| match seed % 10 {
+        0..5 => planned(&RUN_8),
+        5..8 => planned(&RUN_30),
+        _ => Protocol::Combined.run(PERIOD_S, seed),
     };
-    let rows = (run.seconds / PERIOD_S).round() as u32;
-    (0..rows).map(pose).collect()
+    (0..logs).map(move |seed| (seed, run(seed)))
 }
 
-/// Parameters drawn from the prior; those without one near what the stages at hand have.
+/// Parameters drawn from the prior. Parameters without a prior are drawn near the values of usual stages.
 fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
     let start = Parameters::designed(stage);
     let mut parameters = FieldParameters::of_model_31(&start, stage);
@@ -96,8 +61,7 @@ fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
     parameters
 }
 
-/// The log of a run as the field model has it: its signals, white noise at the probes, resets and
-/// drift of the reference.
+/// The log of a run by the field model, with white noise of the probes, resets and drift of the reference.
 fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset {
     let errors = SensorErrors::USUAL;
     let probes = probes(truth);
@@ -107,8 +71,8 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
         let mut error = errors.reset.map(|deviation| random.normal(deviation));
         for (row, pose) in poses.iter().enumerate() {
             let signal_m = probes.map(|probe| {
-                let read = probe.signal_mm(pose.planar.map(|x| x * 1e3), pose.vertical) * 1e-3;
-                read + random.normal(errors.hall_m)
+                let signal = probe.signal_mm(pose.planar.map(|x| x * 1e3), pose.vertical) * 1e-3;
+                signal + random.normal(errors.hall_m)
             });
             dataset.rows.push(Row {
                 movement,
@@ -132,7 +96,7 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
     dataset
 }
 
-/// The field model, from Model (31) by least squares: logs that the field model makes have no codes to judge.
+/// The field model, started from Model (31). (Logs made by the field model have no codes to judge.)
 fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let problem = Problem::new(dataset, &all, stage, Model::of(ModelKind::M31));
@@ -141,13 +105,13 @@ fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
     Ok(fit_field(dataset, &all, stage, &start)?)
 }
 
-/// Logs that the field model makes: parameters.
-fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
+/// Parameters fitted to logs made by the field model.
+fn parameters(stage: &Stage, logs: u64) -> Fallible<Coverage> {
     let mut parameters = Coverage::default();
-    for seed in 0..logs {
+    for (seed, run) in runs(logs) {
         let truth = drawn(stage, &mut Stream::new(seed, Purpose::Assembly, 1));
         let random = &mut Stream::new(seed, Purpose::Sensors, 9);
-        let fit = field(&model_log(&truth, &motion.run(seed), random), stage)?;
+        let fit = field(&model_log(&truth, &run, random), stage)?;
         let errors = fit.posterior.standard_errors();
         let (found, known) = (
             fit.parameters.probes.as_flattened(),
@@ -160,7 +124,7 @@ fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> 
     Ok(parameters)
 }
 
-/// Judges a pose: with the noise of the probes in its signals.
+/// Judges a pose; its signals have the noise of the probes.
 fn add_pose(
     poses: &mut Coverage,
     fit: &FieldFit,
@@ -178,22 +142,15 @@ fn add_pose(
     Some(())
 }
 
-/// Logs of stages made of physics: poses.
-fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
+/// Poses by fits to logs of simulated stages.
+fn poses(stage: &Stage, logs: u64) -> Fallible<Coverage> {
     let mut poses = Coverage::default();
-    for seed in 0..logs {
+    for (seed, run) in runs(logs) {
         let twin = Twin::new(stage, seed);
-        let log = twin.record(motion.run(seed));
-        let fit = field(&log.dataset(stage).ok_or("no plane")?, stage)?;
-        let service = Protocol::Service.run(PERIOD_S, seed);
+        let fit = field(&twin.log(run), stage)?;
+        let service = Protocol::Service.run(PERIOD_S, seed).movements.concat();
         let mut random = Stream::new(seed, Purpose::Sensors, 9);
-        for pose in service
-            .movements
-            .iter()
-            .flatten()
-            .skip(POSE_STRIDE / 2)
-            .step_by(POSE_STRIDE)
-        {
+        for pose in service.iter().skip(POSE_STRIDE / 2).step_by(POSE_STRIDE) {
             let exact = twin.assembly.probes.map(|probe| probe.signal_m(pose));
             let noisy = exact.map(|s| s + random.normal(SensorErrors::USUAL.hall_m));
             add_pose(&mut poses, &fit, pose, noisy);
@@ -207,30 +164,14 @@ fn main() -> Fallible<()> {
     let logs = std::env::args().skip(1).find_map(|a| a.parse().ok());
     let logs: u64 = logs.unwrap_or(200);
     let stage = shipped::stage();
-    let shares = [
-        (Motion::EightSeconds, logs / 2),
-        (Motion::ThirtySeconds, logs * 3 / 10),
-        (Motion::Combined, logs / 5),
-    ];
-    println!("truth within 95 % intervals (rms error over standard error)");
-    println!("logs made by the field model");
-    let mut parameters = Coverage::default();
-    for (motion, logs) in shares {
-        let of_parameters = of_the_model(&stage, motion, logs)?;
-        let title = format!("{}, {logs} logs: parameters", motion.name());
-        println!("  {title:<34}{}", of_parameters.words());
-        parameters = parameters.and(of_parameters);
-    }
-    println!("  {:<34}{}", "all: parameters", parameters.words());
-    println!("logs of stages made of physics");
-    let mut poses = Coverage::default();
-    for (motion, logs) in shares {
-        let of_poses = of_physics(&stage, motion, logs)?;
-        let title = format!("{}, {logs} logs: poses", motion.name());
-        println!("  {title:<34}{}", of_poses.words());
-        poses = poses.and(of_poses);
-    }
-    println!("  {:<34}{}", "all: poses", poses.words());
-
+    println!("truth within 95 % intervals (rms error over standard error), {logs} logs");
+    println!(
+        "parameters, logs made by the field model: {}",
+        parameters(&stage, logs)?.words()
+    );
+    println!(
+        "poses, logs of simulated stages: {}",
+        poses(&stage, logs)?.words()
+    );
     Ok(())
 }

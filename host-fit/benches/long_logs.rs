@@ -6,13 +6,11 @@
 //! cargo bench -p host-fit --bench long_logs -- day      # up to a day: 6 GB
 //! ```
 //!
-//! Logs and poses lie in `target/long_logs`, and are removed. Prints `RESULT key=value` lines and
-//! draws `target/long_logs.svg`. Memory is the kernel's high-water mark (Linux).
+//! Logs and poses lie in `target/long_logs` and are removed. Prints `RESULT key=value` lines. Memory is the
+//! kernel's high-water mark (Linux).
 
 use flate2::read::GzDecoder;
 use host_fit::input::shipped::{LOG_GZ, STAGE_TOML};
-use host_fit::report::axis::Axis;
-use host_fit::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
@@ -23,15 +21,8 @@ use std::time::{Duration, Instant};
 /// Rows of the shipped log, and its length.
 const ROWS: usize = 57_000;
 const LOG_US: u64 = 57 * 2_000_000;
-/// Logs of so many repetitions: two minutes, six, an hour, a day.
+/// Repetitions of the shipped log: up to an hour, and a day.
 const REPEATED: [usize; 5] = [1, 4, 10, 32, 758];
-
-/// What a command took.
-#[derive(Clone, Copy)]
-struct Taken {
-    seconds: f64,
-    megabytes: f64,
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let a_day = std::env::args().any(|argument| argument == "day");
@@ -40,30 +31,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::write(folder.join("stage.toml"), STAGE_TOML)?;
     let mut shipped = String::new();
     GzDecoder::new(LOG_GZ).read_to_string(&mut shipped)?;
-    let mut points = Vec::new();
     for times in &REPEATED[..REPEATED.len() - usize::from(!a_day)] {
         let rows = times * ROWS;
         write_log(&shipped, *times, &folder.join("log.csv"))?;
-        let fit = run(&folder, "fit log.csv --stage stage.toml --out p.bin")?;
-        let decode = run(
-            &folder,
-            "decode p.bin log.csv --stage stage.toml --out pose.csv",
-        )?;
-        println!(
-            "RESULT rows={rows} fit_s={:.2} fit_mb={:.0} decode_s={:.2} decode_mb={:.0} decoded_rows_per_s={:.2e}",
-            fit.seconds,
-            fit.megabytes,
-            decode.seconds,
-            decode.megabytes,
-            rows as f64 / decode.seconds
-        );
-        points.push((rows as f64, fit, decode));
+        let fit = "fit log.csv --stage stage.toml --out p.bin";
+        let decode = "decode p.bin log.csv --stage stage.toml --out pose.csv";
+        for (name, command) in [("fit", fit), ("decode", decode)] {
+            let (seconds, megabytes) = run(&folder, command)?;
+            println!("RESULT rows={rows} {name}_s={seconds:.2} {name}_mb={megabytes:.0}");
+        }
     }
-    std::fs::remove_dir_all(&folder)?;
-    Ok(plot(&points, &folder.with_extension("svg"))?)
+    Ok(std::fs::remove_dir_all(&folder)?)
 }
 
-/// The shipped log so many times, one after the other.
+/// Writes the shipped log several times, one after the other.
 fn write_log(shipped: &str, times: usize, path: &Path) -> Result<(), Box<dyn Error>> {
     let mut out = BufWriter::new(File::create(path)?);
     let (header, rows) = shipped.split_once('\n').ok_or("no header")?;
@@ -80,8 +61,8 @@ fn write_log(shipped: &str, times: usize, path: &Path) -> Result<(), Box<dyn Err
     Ok(out.flush()?)
 }
 
-/// Runs a command of `host-fit`; the memory is read every 5 ms while it runs.
-fn run(folder: &Path, arguments: &str) -> Result<Taken, Box<dyn Error>> {
+/// Time (s) and memory (MB) of a command of `host-fit`. The memory is read every 5 ms.
+fn run(folder: &Path, arguments: &str) -> Result<(f64, f64), Box<dyn Error>> {
     let started = Instant::now();
     let mut child = Command::new(env!("CARGO_BIN_EXE_host-fit"))
         .args(arguments.split(' '))
@@ -104,34 +85,5 @@ fn run(folder: &Path, arguments: &str) -> Result<Taken, Box<dyn Error>> {
     if !ended.success() {
         return Err(format!("host-fit {arguments}: {ended}").into());
     }
-    Ok(Taken {
-        seconds: started.elapsed().as_secs_f64(),
-        megabytes: f64::from(kilobytes) / 1e3,
-    })
-}
-
-/// Both commands over the rows, on logarithmic axes: time above, memory below.
-fn plot(points: &[(f64, Taken, Taken)], path: &Path) -> std::io::Result<()> {
-    let panel = |label: &str, of: fn(&Taken) -> f64| {
-        let fit = points.iter().map(|(rows, fit, _)| (*rows, of(fit)));
-        let decode = points.iter().map(|(rows, _, decode)| (*rows, of(decode)));
-        Panel {
-            label: label.to_owned(),
-            scale: Scale::Logarithmic,
-            marks: vec![
-                Mark::Line(Tone::Of(0), fit.collect()),
-                Mark::Line(Tone::Of(1), decode.collect()),
-            ],
-        }
-    };
-    let chart = Chart {
-        caption: "fit and decode over the length of a log".to_owned(),
-        x_label: "rows".to_owned(),
-        x: Axis::Logarithmic(4e4, 6e7),
-        panels: vec![
-            panel("s", |taken| taken.seconds),
-            panel("MB", |taken| taken.megabytes),
-        ],
-    };
-    std::fs::write(path, chart.svg_file(&[(0, "fit"), (1, "decode")]))
+    Ok((started.elapsed().as_secs_f64(), f64::from(kilobytes) / 1e3))
 }

@@ -1,12 +1,11 @@
-//! What a planned run of 20 s leads to on stages of unknown assembly: 20 simulated stages run it,
-//! are fitted, and are judged by their service against the truth, beside the forecast.
+//! A planned run of 20 s on 20 simulated stages: the errors in service of its fit, beside the forecast.
 //!
-//! The floor of a stage is what parameters fitted to its own service truth leave. Prints a table
-//! and `RESULT key=value` lines.
+//! The noise floor of a stage is the error of parameters that are fitted to its own service with the
+//! true poses. Prints a table and `RESULT key=value` lines.
 
 mod common;
 
-use common::{Axes, Fallible, Twin, fitted, rms};
+use common::{Axes, Fallible, Twin, fitted, mean_and_worst, rms, words};
 use host_fit::calibration::plan::plan;
 use host_fit::input::shipped;
 use host_fit::simulate::protocol::{Protocol, Run};
@@ -25,12 +24,10 @@ fn main() -> Fallible<()> {
     let trajectory = plan.run.trajectory(stage.servo_period_s);
 
     println!("seed  rms in service (um, um, urad)   floor                  rms over floor");
-    let words = |[x, y, z]: Axes| format!("{x:7.4} {y:7.4} {z:7.4}");
     let mut all = Vec::new();
     for seed in 1..=SEEDS {
         let twin = Twin::new(&stage, seed);
-        let log = twin.record(Run::planned(trajectory.clone()));
-        let log = log.dataset(&stage).ok_or("no plane")?;
+        let log = twin.log(Run::planned(trajectory.clone()));
         let service = twin.record(Protocol::Service.run(stage.servo_period_s, seed));
         let service = service.dataset_with_truth(&stage).ok_or("no plane")?;
         let [found, floor] = [
@@ -43,14 +40,12 @@ fn main() -> Fallible<()> {
         println!("{seed:4}  {found}        {floor}  {}", words(ratio));
         all.push(ratio);
     }
-    let predicted = plan.forecast.service.ratios();
+    let (predicted, [mean, worst]) = (plan.forecast.service.ratios(), mean_and_worst(&all));
     for (k, axis) in ["x", "y", "rz"].into_iter().enumerate() {
-        let of = || all.iter().map(|ratio| ratio[k]);
-        let (mean, worst) = (of().sum::<f64>() / SEEDS as f64, of().fold(0.0, f64::max));
         let key = format!("RESULT service_over_floor_{axis}");
         println!(
-            "{key}_predicted={:.4}\n{key}_mean={mean:.4}\n{key}_worst={worst:.4}",
-            predicted[k]
+            "{key}_predicted={:.4}\n{key}_mean={:.4}\n{key}_worst={:.4}",
+            predicted[k], mean[k], worst[k]
         );
     }
     Ok(())

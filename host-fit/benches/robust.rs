@@ -1,5 +1,5 @@
-//! What bad rows in a log cost in service, by loss: rms of the errors against the truth over those of
-//! the fit to the clean log, the worst of X, Y, Rz.
+//! The cost of bad rows in service for each `--loss`: rms errors against the truth over the errors of the fit
+//! to the clean log, worst of X, Y, Rz.
 //!
 //! `cargo bench -p host-fit --bench robust`: a minute.
 
@@ -24,7 +24,7 @@ const HALL: [usize; 3] = [8, 9, 10];
 const NM_PER_UM: i64 = 1000;
 const CODES_PER_UM: i64 = 16;
 
-/// What is wrong with a log.
+/// Faults of a log.
 const FAULTS: [&str; 7] = [
     "nothing",
     "1 % of rows 50 um off, a beam",
@@ -79,7 +79,7 @@ fn rms_in_service(
     Ok(rms(&fit(log, stage, &settings)?.set, service, stage))
 }
 
-/// A log with one of the faults, the same at every call.
+/// A log with one of the faults; every call gives the same log.
 fn with_fault(log: &str, fault: usize) -> String {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let (header, rows) = log.split_once('\n').unwrap_or_default();

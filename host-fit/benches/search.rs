@@ -11,7 +11,7 @@
 
 mod common;
 
-use common::{Fallible, median, median_s, read};
+use common::{Axes, Fallible, median, median_s, read};
 use host_fit::calibration::fit::calibration;
 use host_fit::calibration::judge::{Decoded, Zeros};
 use host_fit::input::dataset::Dataset;
@@ -38,10 +38,9 @@ const EVALUATIONS: f64 = 20_100.0;
 const ROWS: usize = 200;
 /// Each solver runs with the seeds 1 to 10; a seed draws the rows and the first population.
 const SEEDS: u64 = 10;
-/// A search is near once its fitness is within 1 % of the least-squares fitness, and exact once
-/// the sum of squares is within 1e-6.
-const NEAR: f64 = 0.01;
-const EXACT: f64 = 5e-7;
+/// A search is at the floor once its fitness is this close to the least-squares fitness: 1e-6 of the sum of
+/// squares.
+const AT_FLOOR: f64 = 5e-7;
 
 fn main() -> Fallible<()> {
     // Cargo passes `--bench`.
@@ -63,7 +62,7 @@ fn main() -> Fallible<()> {
     let mut history = String::from("form,solver,seed,evaluations,fitness,p\n");
     println!(
         "| form | solver | train fitness: median (range) | X, Y, Rz rms, median (um, um, urad) \
-         | within 1 % of the floor | at the floor (1e-6) |\n|---|---|---|---|---|---|"
+         | at the floor (1e-6) |\n|---|---|---|---|---|"
     );
     for form in [Projection::None, Projection::Delta, Projection::Linear] {
         compare(form, &problems, &dataset, &mut history)?;
@@ -157,23 +156,22 @@ fn compare(
 struct Run {
     /// Fitness over the rows of the problem, um, um, urad.
     fitness: f64,
-    /// Evaluations until the search was near, and exact.
-    arrivals: [Option<f64>; 2],
+    /// Evaluations until the search was at the floor.
+    arrival: Option<f64>,
     /// rms over all rows of the log, zero deviations refitted, um, um, urad; `None` where the
     /// parameters cannot serve a decoder.
-    rms: Option<[f64; 3]>,
+    rms: Option<Axes>,
 }
 
 impl Run {
     fn new(problem: &Problem<'_>, found: &Solution, floor: &Solution, dataset: &Dataset) -> Self {
         let (fitness, floor) = (problem.fitness(found.cost), problem.fitness(floor.cost));
-        let arrival = |share: f64| {
-            let is_near = |fitness: f64| fitness <= floor * (1.0 + share);
-            let mut points = found.history.iter();
-            let first = points.find(|point| is_near(point.best_cost));
-            let first = first.map(|point| point.evaluations as f64);
-            let is_search = !found.history.is_empty();
-            first.or((!is_search && is_near(fitness)).then_some(found.evaluations as f64))
+        let is_there = |fitness: f64| fitness <= floor * (1.0 + AT_FLOOR);
+        let mut points = found.history.iter();
+        let arrival = match points.len() {
+            0 => is_there(fitness).then_some(found.evaluations as f64),
+            _ => (points.find(|point| is_there(point.best_cost)))
+                .map(|point| point.evaluations as f64),
         };
         let (stage, parameters) = (problem.stage, &found.parameters);
         let parameters = FieldParameters::of_model_31(parameters, stage);
@@ -185,44 +183,34 @@ impl Run {
         });
         Self {
             fitness,
-            arrivals: [NEAR, EXACT].map(arrival),
+            arrival,
             rms,
         }
     }
 }
 
+/// Prints a line of the table.
 fn print(form: Projection, solver: &str, runs: &[Run]) {
-    let fitness = || runs.iter().map(|run| run.fitness);
-    let (low, high) = (
-        fitness().fold(f64::INFINITY, f64::min),
-        fitness().fold(0.0, f64::max),
-    );
-    let fitness = median(fitness().collect());
-    let sound: Vec<[f64; 3]> = runs.iter().filter_map(|run| run.rms).collect();
+    let fitness: Vec<f64> = runs.iter().map(|run| run.fitness).collect();
+    let low = fitness.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = fitness.iter().copied().fold(0.0, f64::max);
+    let (form, fitness, count) = (form.name(), median(fitness), runs.len());
+    let sound: Vec<Axes> = runs.iter().filter_map(|run| run.rms).collect();
     let rms = match sound.len() {
         0 => "-".to_owned(),
-        count => {
+        sound_count => {
             let axis = |axis: usize| median(sound.iter().map(|rms| rms[axis]).collect());
-            let [x, y, rz] = [0, 1, 2].map(axis);
-            let part = match count == runs.len() {
-                true => String::new(),
-                false => format!(" ({count} of {})", runs.len()),
-            };
-            format!("{x:.3}, {y:.3}, {rz:.3}{part}")
+            let rms = [0, 1, 2].map(|k| format!("{:.3}", axis(k))).join(", ");
+            match sound_count == count {
+                true => rms,
+                false => format!("{rms} ({sound_count} of {count})"),
+            }
         }
     };
-    let arrivals = [0, 1].map(|k| {
-        let arrived: Vec<f64> = runs.iter().filter_map(|run| run.arrivals[k]).collect();
-        let when = match arrived.len() {
-            0 => String::new(),
-            _ => format!(", {:.0} evaluations", median(arrived.clone())),
-        };
-        format!("{} of {}{when}", arrived.len(), runs.len())
-    });
-    println!(
-        "| {form} | {solver} | {fitness:.3} ({low:.3} to {high:.3}) | {rms} | {} | {} |",
-        arrivals[0],
-        arrivals[1],
-        form = form.name(),
-    );
+    let arrived: Vec<f64> = runs.iter().filter_map(|run| run.arrival).collect();
+    let arrivals = match arrived.len() {
+        0 => format!("0 of {count}"),
+        seeds => format!("{seeds} of {count}, {:.0} evaluations", median(arrived)),
+    };
+    println!("| {form} | {solver} | {fitness:.3} ({low:.3} to {high:.3}) | {rms} | {arrivals} |");
 }

@@ -1,5 +1,5 @@
-//! What the main job costs, and how fast the host decodes a log from memory, with the target's code and
-//! bits, on one core.
+//! The time of a fit with its judgement, and the rate of the target's decoder on the host, from memory and
+//! on one core.
 //!
 //! Prints `RESULT key=value` lines, medians of several runs.
 
@@ -33,7 +33,7 @@ fn main() -> Fallible<()> {
     Ok(())
 }
 
-/// Each reading is looked at: its words go into a sum.
+/// The words of each reading go into a sum, so that none is optimised away.
 fn decode(log: &Dataset) {
     let frames: Vec<RawFrame> = (log.rows.iter())
         .filter_map(|row| row.frame.all_codes())

@@ -1,18 +1,15 @@
-//! What temperature costs and what its model leaves, on simulated stages: errors in service over the
-//! noise of the probes, against the truth, re-zeroed by the 0.4 s at rest before each movement.
+//! Errors in service of stages that warm in service, against the truth, over the noise of the probes. Each
+//! movement is re-zeroed by the 0.4 s at rest before it.
 //!
-//! `cargo bench -p host-fit --bench temperature [-- STAGES | FOLDER STAGE.TOML]`: 20 stages by default,
-//! minutes; or the logs `cold`, `early`, `warm`, `day` and `day.truth` of a folder.
+//! `cargo bench -p host-fit --bench temperature [-- STAGES]`: 20 simulated stages by default, minutes.
 
 mod common;
 
-use common::{Axes, Coverage, Fallible, RUN_8, RUN_30, Twin, fitted};
+use common::{Axes, Coverage, Fallible, RUN_8, RUN_30, Twin, fitted, mean_and_worst, words};
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::judge::Decoded;
 use host_fit::calibration::judge::statistics::over_noise;
 use host_fit::calibration::plan::run::PlannedRun;
-use host_fit::input::dataset::Dataset;
-use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::assembly::Assembly;
@@ -23,13 +20,12 @@ use host_fit::simulate::thermal::{ASSEMBLED_C, Climate};
 use host_fit::solver::solve::field::carry::service_poses;
 use runtime::ModelKind;
 use runtime::frame::MISSING_CODE;
-use std::path::{Path, PathBuf};
 
-/// Distances from the cold run, K.
+/// Temperatures of the service above the cold run, K.
 const CHANGES_K: [f64; 4] = [-10.0, -5.0, 5.0, 10.0];
-/// Most that the mean and the worst stage may have at these, ...
+/// Limits of the mean and of the worst stage at these temperatures, ...
 const LIMITS: [[f64; 2]; 4] = [[1.06, 1.3], [1.02, 1.1], [1.02, 1.1], [1.06, 1.3]];
-/// ... the mean where sensors are off, ...
+/// ... of the mean with errors of the sensors, ...
 const LIMITS_OFF: [f64; 2] = [1.08, f64::INFINITY];
 /// ... and over the day.
 const LIMITS_DAY: [f64; 2] = [1.04, 1.1];
@@ -40,7 +36,7 @@ impl Twin<'_> {
         self.record_in(run, climate)
     }
 
-    /// Service this far from the cold run, each movement after a rest.
+    /// Service at a temperature above the cold run, each movement after a rest.
     fn service(&self, change_k: f64) -> Recording {
         let period_s = self.stage.servo_period_s;
         let mut run = Protocol::Service.run(period_s, self.seed);
@@ -58,10 +54,11 @@ impl Twin<'_> {
 
     fn judge(&self, fit: &Fit, recording: &Recording) -> Fallible<Axes> {
         let truth = recording.dataset_with_truth(self.stage).ok_or("no plane")?;
-        Ok(ratios(fit, &truth))
+        let errors = Decoded::new(&fit.set, &truth).rezeroed(&truth, REST_S);
+        Ok(over_noise(&errors, &truth.movements))
     }
 
-    /// Change of the signals of A, B, C over service between two pairs of temperatures, as a part.
+    /// Relative change of the signals of A, B, C over service between two pairs of temperatures.
     fn change(&self, from_c: [f64; 2], to_c: [f64; 2]) -> [f64; 3] {
         let [from, to] = [from_c, to_c].map(|celsius| self.thermal.warmed(&self.assembly, celsius));
         let [x, y, rz, z, rx, ry] = RUN_30.amplitudes;
@@ -69,8 +66,10 @@ impl Twin<'_> {
             .map(|(planar, vertical)| StagePose { planar, vertical })
             .collect();
         [0, 1, 2].map(|probe| {
-            let signals = |of: &Assembly| -> Vec<f64> {
-                let signals = poses.iter().map(|pose| of.probes[probe].signal_m(pose));
+            let signals = |assembly: &Assembly| -> Vec<f64> {
+                let signals = poses
+                    .iter()
+                    .map(|pose| assembly.probes[probe].signal_m(pose));
                 let signals: Vec<f64> = signals.collect();
                 let mean = signals.iter().sum::<f64>() / signals.len() as f64;
                 signals.into_iter().map(|signal| signal - mean).collect()
@@ -86,13 +85,7 @@ const fn steady(change_k: f64) -> Climate {
     Climate::Steady(ASSEMBLED_C + change_k)
 }
 
-/// rms of the errors over that of the noise, in the rows after the rest.
-fn ratios(fit: &Fit, truth: &Dataset) -> Axes {
-    let errors = Decoded::new(&fit.set, truth).rezeroed(truth, REST_S);
-    over_noise(&errors, &truth.movements)
-}
-
-/// Without temperatures in the log.
+/// A log with some temperature sensors only.
 fn blind(recording: &Recording, sensors: [bool; 2]) -> Recording {
     changed(recording, |read_mc| {
         [0, 1].map(|k| if sensors[k] { read_mc[k] } else { MISSING_CODE })
@@ -107,17 +100,14 @@ fn changed(recording: &Recording, change: impl Fn([i32; 2]) -> [i32; 2]) -> Reco
     recording
 }
 
-/// Ratios of some stages.
+/// Errors over the noise, for some stages.
 #[derive(Default)]
 struct Ratios(Vec<Axes>);
 
 impl Ratios {
-    /// Prints means and worst stages; whether they are within `limits` of any axis, where there are some.
+    /// Prints means and worst stages; `false` if one is beyond its limit.
     fn print(&self, title: &str, limits: Option<[f64; 2]>) -> bool {
-        let of = |axis: usize| self.0.iter().map(move |ratio| ratio[axis]);
-        let words = |values: Axes| values.map(|x| format!("{x:6.3}")).join(" ");
-        let mean = [0, 1, 2].map(|axis| of(axis).sum::<f64>() / self.0.len() as f64);
-        let worst = [0, 1, 2].map(|axis| of(axis).fold(0.0, f64::max));
+        let [mean, worst] = mean_and_worst(&self.0);
         let most = [mean, worst].map(|axes| axes.into_iter().fold(0.0, f64::max));
         let is_within = limits.is_none_or(|limits| most[0] <= limits[0] && most[1] <= limits[1]);
         let limits = limits.map_or(String::new(), |[mean, worst]| {
@@ -131,23 +121,20 @@ impl Ratios {
 
 /// Prints errors of coefficients, per K.
 fn print(title: &str, errors: Coverage) {
-    let (percent, of, words) = (errors.rms() * 100.0, errors.of, errors.words());
-    println!("{title:<58}{percent:.4} %/K rms, of {of} within 95 % intervals {words}");
+    let (percent, count, words) = (errors.rms() * 100.0, errors.count, errors.words());
+    println!("{title:<58}{percent:.4} %/K rms, of {count} within 95 % intervals {words}");
 }
 
-/// Errors of k of a mount's sensor alone (with which the body goes), by `run30` cold and `run8` warm.
-fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fallible<Coverage> {
+/// Errors of k of stages with a sensor on the mount only, by a cold run of 30 s and a warm run of 8 s. Mount and
+/// body have the same temperature.
+fn mount_only(stage: &Stage, stages: u64, spacing_k: f64) -> Fallible<Coverage> {
     let mut all = Coverage::default();
     for seed in 1..=stages {
-        let mut twin = Twin::new(stage, seed);
-        if !grows {
-            twin.thermal.expansion_per_k = [0.0; 2];
-        }
+        let twin = Twin::new(stage, seed);
         let [cold, warm] = [(RUN_30, 0.0), (RUN_8, spacing_k)]
             .map(|(run, change_k)| blind(&twin.planned(&run, steady(change_k)), [true, false]));
         let field = twin.fit(&[&cold, &warm])?.field.ok_or("no field model")?;
         let zero_c = f64::from(field.warmth.temperature.zero_mc[0]) * 1e-3;
-        // Per K of both.
         let truth = twin.change([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
         for (probe, truth) in truth.into_iter().enumerate() {
             let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
@@ -157,7 +144,11 @@ fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fall
     Ok(all)
 }
 
-fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
+fn main() -> Fallible<()> {
+    // Cargo passes `--bench`.
+    let stages = std::env::args().skip(1).find_map(|a| a.parse().ok());
+    let stages: u64 = stages.unwrap_or(20);
+    let stage = shipped::stage();
     println!(
         "errors over the noise, {stages} stages{:>48}",
         "mean X, Y, Rz         worst X, Y, Rz"
@@ -167,7 +158,7 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         let mut by_change: [Ratios; 4] = Default::default();
         let mut off = Ratios::default();
         for seed in 1..=stages {
-            let twin = Twin::new(stage, seed);
+            let twin = Twin::new(&stage, seed);
             let cold = twin.planned(&RUN_30, steady(0.0));
             let warm = twin.planned(&RUN_8, steady(spacing_k));
             let fit = twin.fit(&[&cold, &warm])?;
@@ -188,7 +179,7 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
     let mut days: [Ratios; 4] = Default::default();
     let (mut k, mut h) = (Coverage::default(), Coverage::default());
     for seed in 1..=stages {
-        let twin = Twin::new(stage, seed);
+        let twin = Twin::new(&stage, seed);
         let at = |hour: f64| Climate::Day { hour };
         let cold = twin.planned(&RUN_30, at(-1.0 / 6.0));
         let early = twin.planned(&RUN_8, at(1.0 / 6.0));
@@ -211,12 +202,9 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
             .zero_mc
             .map(|mc| f64::from(mc) * 1e-3);
         for (sensor, all) in [&mut k, &mut h].into_iter().enumerate() {
-            let at = |by: f64| {
-                if sensor == 0 {
-                    [mount + by, body]
-                } else {
-                    [mount, body + by]
-                }
+            let at = |k: f64| match sensor {
+                0 => [mount + k, body],
+                _ => [mount, body + k],
             };
             let truth = twin.change(at(-0.5), at(0.5));
             for (probe, truth) in truth.into_iter().enumerate() {
@@ -240,69 +228,12 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
     }
     print("k by cold, early, warm", k);
     print("h by cold, early, warm", h);
-    for (spacing_k, grows) in [(3.0, true), (5.0, true), (3.0, false)] {
-        let found = coefficients(stage, 5 * stages, spacing_k, grows)?;
-        let growth = if grows {
-            ""
-        } else {
-            ", stages that do not grow"
-        };
-        print(
-            &format!("k by run30, run8 {spacing_k} K warmer{growth}"),
-            found,
-        );
+    for spacing_k in [3.0, 5.0] {
+        let found = mount_only(&stage, 5 * stages, spacing_k)?;
+        print(&format!("k by run30, run8 {spacing_k} K warmer"), found);
     }
     match all_met {
         true => Ok(()),
         false => Err("a limit is missed".into()),
     }
-}
-
-/// The logs of a folder.
-fn of_logs(folder: &Path, stage: &Path) -> Fallible<()> {
-    let stage = Stage::from_file(stage)?;
-    let paths = |names: &[&str]| -> Vec<PathBuf> {
-        names
-            .iter()
-            .map(|name| folder.join(format!("{name}.csv.gz")))
-            .collect()
-    };
-    let read = |names: &[&str]| log::read(&paths(names), &stage, &ReadOptions::DECODE);
-    let mut day = read(&["day"])?.dataset;
-    let truth = std::fs::read(&paths(&["day.truth"])[0])?;
-    let mut text = String::new();
-    std::io::Read::read_to_string(
-        &mut flate2::read::GzDecoder::new(truth.as_slice()),
-        &mut text,
-    )?;
-    for (row, line) in day.rows.iter_mut().zip(text.lines().skip(1)) {
-        let cells: Vec<f64> = line
-            .split(',')
-            .skip(2)
-            .map_while(|cell| cell.parse().ok())
-            .collect();
-        row.reference = [cells[0] * 1e-9, cells[1] * 1e-9, cells[2] * 1e-9];
-    }
-    for names in [&["cold", "early", "warm"][..], &["cold", "warm"], &["cold"]] {
-        let logs = log::read(&paths(names), &stage, &ReadOptions::FIT)?.dataset;
-        let mut ratio = Ratios::default();
-        ratio
-            .0
-            .push(ratios(&fitted(&logs, &stage, ModelKind::Field)?, &day));
-        ratio.print(&format!("{}; the day", names.join(", ")), None);
-    }
-    Ok(())
-}
-
-fn main() -> Fallible<()> {
-    // Cargo passes `--bench`.
-    let given: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
-    if let [folder, stage] = given.as_slice() {
-        return of_logs(folder.as_ref(), stage.as_ref());
-    }
-    let stages = given.first().map_or(Ok(20), |stages| stages.parse())?;
-    of_twins(&shipped::stage(), stages)
 }

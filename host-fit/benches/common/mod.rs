@@ -1,4 +1,4 @@
-//! What the benchmarks share: simulated stages, fits to their logs, and errors against the truth.
+//! Shared by the benchmarks: simulated stages, fits to their logs, and errors against the truth.
 #![allow(dead_code, reason = "each benchmark uses a part of it")]
 
 use host_fit::calibration::fit::{Fit, FitSettings, ModelChoice, fit};
@@ -24,7 +24,7 @@ pub type Axes = [f64; 3];
 /// 95 % of normal numbers are within this many standard deviations.
 const WITHIN: f64 = 1.959_964;
 
-/// `run30` and `run8` of the given logs.
+/// Runs of 30 s and 8 s.
 pub const RUN_30: PlannedRun = run(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0]);
 pub const RUN_8: PlannedRun = run(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]);
 
@@ -60,14 +60,19 @@ impl<'a> Twin<'a> {
         }
     }
 
-    /// As it was assembled.
+    /// The recording of a run at the temperature of assembly.
     pub fn record(&self, run: Run) -> Recording {
         let errors = &SensorErrors::USUAL;
         let recording = record(self.stage, &self.assembly, run, errors, self.seed);
         recording.expect("no probe hits its magnet")
     }
 
-    /// Following the temperatures of a climate.
+    /// The log of a run at the temperature of assembly.
+    pub fn log(&self, run: Run) -> Dataset {
+        dataset(&self.record(run), self.stage)
+    }
+
+    /// The recording of a run in a climate.
     pub fn record_in(&self, run: Run, climate: Climate) -> Recording {
         let (parts, errors) = ((&self.assembly, &self.thermal), &SensorErrors::USUAL);
         let recording = record_in(self.stage, parts, climate, run, errors, self.seed);
@@ -75,22 +80,27 @@ impl<'a> Twin<'a> {
     }
 }
 
+pub fn dataset(recording: &Recording, stage: &Stage) -> Dataset {
+    let dataset = recording.dataset(stage);
+    dataset.expect("a checked stage has no capacitive sensors in a line")
+}
+
 pub fn fitted(dataset: &Dataset, stage: &Stage, kind: ModelKind) -> Fallible<Fit> {
     let model = ModelChoice::Named(Model::of(kind));
     Ok(fit(dataset, stage, &FitSettings::new(model))?)
 }
 
-/// rms errors of the poses that a blob gives for a log whose reference is the truth, m, m, rad.
+/// rms errors of the decoded poses of a log, m, m, rad; the reference of the log is the truth.
 pub fn rms(set: &ParameterSet, truth: &Dataset, stage: &Stage) -> Axes {
     let judged = Decoded::new(set, truth).judge(truth, stage, Zeros::None);
     judged.errors.axes.map(|axis| axis.rms)
 }
 
-/// Errors in terms of their standard errors, and how many of them lie within 95 % intervals.
+/// Errors over their standard errors, and the number within 95 % intervals.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Coverage {
     within: u64,
-    pub of: u64,
+    pub count: u64,
     squares: f64,
     scaled: f64,
 }
@@ -99,31 +109,22 @@ impl Coverage {
     pub fn add(&mut self, error: f64, variance: f64) {
         let scaled = error * error / variance;
         self.within += u64::from(scaled <= WITHIN * WITHIN);
-        self.of += 1;
+        self.count += 1;
         self.squares += error * error;
         self.scaled += scaled;
     }
 
-    pub fn and(self, other: Self) -> Self {
-        Self {
-            within: self.within + other.within,
-            of: self.of + other.of,
-            squares: self.squares + other.squares,
-            scaled: self.scaled + other.scaled,
-        }
-    }
-
     fn mean_root(&self, sum: f64) -> f64 {
-        (sum / self.of.max(1) as f64).sqrt()
+        (sum / self.count.max(1) as f64).sqrt()
     }
 
     pub fn rms(&self) -> f64 {
         self.mean_root(self.squares)
     }
 
-    /// Per cent within, and the rms error in terms of the standard error.
+    /// Per cent within the intervals, and the rms error over the standard error.
     pub fn words(&self) -> String {
-        let percent = 100.0 * self.within as f64 / self.of.max(1) as f64;
+        let percent = 100.0 * self.within as f64 / self.count.max(1) as f64;
         format!("{percent:5.1} % ({:.2})", self.mean_root(self.scaled))
     }
 }
@@ -137,7 +138,21 @@ pub fn median(mut numbers: Vec<f64>) -> f64 {
     }
 }
 
-/// Median time of so many calls, s.
+/// The mean and the worst of some stages.
+pub fn mean_and_worst(stages: &[Axes]) -> [Axes; 2] {
+    let axis = |axis: usize| stages.iter().map(move |values| values[axis]);
+    [
+        [0, 1, 2].map(|k| axis(k).sum::<f64>() / stages.len() as f64),
+        [0, 1, 2].map(|k| axis(k).fold(0.0, f64::max)),
+    ]
+}
+
+/// X, Y and Rz of a table.
+pub fn words(axes: Axes) -> String {
+    axes.map(|x| format!("{x:7.4}")).join(" ")
+}
+
+/// Median time of some calls, s.
 pub fn median_s(calls: usize, mut call: impl FnMut()) -> f64 {
     let time = |_| {
         let started = Instant::now();

@@ -1,7 +1,7 @@
-//! What the diagnosis says of simulated logs: of 200 clean stages how many it warns of, and of logs
-//! with a mistake or a fault how many it names; of logs of the paper what is predicted of service.
+//! The diagnosis of simulated logs: warnings on 200 clean stages, mistakes and faults that it names, and
+//! the predicted errors in service.
 //!
-//! Prints a table and `RESULT key=value` lines.
+//! Prints tables and `RESULT key=value` lines.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -9,7 +9,7 @@ mod faults;
 mod paper;
 mod signals;
 
-use common::Twin;
+use common::{Twin, dataset};
 use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::diagnose::structure::structure;
 use host_fit::calibration::fit::{FitError, FitSettings, ModelChoice, fit};
@@ -23,9 +23,9 @@ use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
 
-/// Clean stages: each makes one of the three kinds of log.
+/// Number of clean stages. Each has one of the three kinds of log.
 const CLEAN: u64 = 200;
-/// Stages that each mistake is made on, again with the three kinds in turn.
+/// Number of stages for each mistake, again with the three kinds in turn.
 const FAULTY: u64 = 12;
 
 fn main() {
@@ -38,8 +38,7 @@ fn main() {
         let found = (1..=FAULTY).map(|seed| {
             let mut recording = recording(&stage, &planned, 1000 + seed);
             recording.movements.iter_mut().flatten().for_each(mistake);
-            let dataset = recording.dataset(&stage).expect("a plane");
-            let mut found = structure(&dataset, &stage, false).into_iter();
+            let mut found = structure(&dataset(&recording, &stage), &stage, false).into_iter();
             found.any(|finding| finding.code() == code)
         });
         let named = found.filter(|is_named| *is_named).count();
@@ -50,7 +49,7 @@ fn main() {
     signals::table(&stage, &planned);
 }
 
-/// The findings of a log above a note, as `fit` gives them, and why there is no fit.
+/// The warnings and refusals of `fit` for a log, and the error of the fit.
 fn grave(dataset: &Dataset, stage: &Stage) -> (Vec<Finding>, Option<FitError>) {
     let fitted = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
     let mut found = diagnose_log(dataset, stage, fitted.as_ref()).findings;
@@ -58,12 +57,12 @@ fn grave(dataset: &Dataset, stage: &Stage) -> (Vec<Finding>, Option<FitError>) {
     (found, fitted.err())
 }
 
-/// Findings above a note on clean stages.
+/// Counts the clean stages with a warning.
 fn clean(stage: &Stage, planned: &Trajectory) {
     let mut warned = 0;
     for seed in 1..=CLEAN {
-        let recording = recording(stage, planned, seed);
-        let (grave, error) = grave(&recording.dataset(stage).expect("a plane"), stage);
+        let log = dataset(&recording(stage, planned, seed), stage);
+        let (grave, error) = grave(&log, stage);
         for found in &grave {
             println!("clean stage {seed}: {:?}: {}", found.code(), message(found));
         }
@@ -76,7 +75,7 @@ fn clean(stage: &Stage, planned: &Trajectory) {
     println!("RESULT clean_stages_warned={warned}");
 }
 
-/// A log of the stage of a seed: by the paper's protocol, combined or planned.
+/// A recording of the stage of a seed: by the paper's protocol, combined or planned.
 fn recording(stage: &Stage, planned: &Trajectory, seed: u64) -> Recording {
     Twin::new(stage, seed).record(match seed % 3 {
         0 => Protocol::Paper.run(stage.servo_period_s, seed),
@@ -85,7 +84,7 @@ fn recording(stage: &Stage, planned: &Trajectory, seed: u64) -> Recording {
     })
 }
 
-/// Service of a stage with a reference that has no errors.
+/// Service of a stage with an exact reference.
 fn service(twin: &Twin) -> Recording {
     let quiet = SensorErrors {
         drift_per_root_s: [0.0; 3],
@@ -97,7 +96,7 @@ fn service(twin: &Twin) -> Recording {
     record(twin.stage, &twin.assembly, run, &quiet, seed).expect("clear")
 }
 
-/// What a laboratory does to channels, and what names it.
+/// A mistake of a laboratory, and the code of its finding.
 type Mistake = (&'static str, Code, fn(&mut Sample));
 
 #[rustfmt::skip]

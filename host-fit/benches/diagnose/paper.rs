@@ -1,7 +1,7 @@
-//! Logs of the paper's protocol: whether the range of errors that is predicted of Model (31) holds the truth in
-//! service, and what the field model has there once the errors of the resets are declared.
+//! Logs of the paper's protocol: the share of predicted ranges for Model (31) that hold the true errors in
+//! service, and the field model once the errors of the resets are declared.
 
-use crate::common::{Twin, rms};
+use crate::common::{Twin, dataset, rms};
 use crate::service;
 use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
@@ -20,11 +20,10 @@ pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
         let (mut predicted, mut true_worst) = (0.0, [0.0, 0.0f64]);
         for seed in seeds.clone() {
             let twin = Twin::new(stage, seed);
-            let log = twin.record(Protocol::Paper.run(stage.servo_period_s, seed));
-            let service = service(&twin).dataset(stage).expect("a plane");
-            let dataset = log.dataset(stage).expect("a plane");
-            let fitted = fit(&dataset, stage, &FitSettings::new(ModelChoice::Auto));
-            let diagnosis = diagnose_log(&dataset, stage, fitted.as_ref());
+            let log = twin.log(Protocol::Paper.run(stage.servo_period_s, seed));
+            let service = dataset(&service(&twin), stage);
+            let fitted = fit(&log, stage, &FitSettings::new(ModelChoice::Auto));
+            let diagnosis = diagnose_log(&log, stage, fitted.as_ref());
             let (Ok(fitted), Some(expected)) = (fitted, diagnosis.predicted) else {
                 println!("{what}: no fit of stage {seed}");
                 continue;

@@ -15,20 +15,6 @@ const LEFT: f64 = 104.0;
 const RIGHT: f64 = 696.0;
 const MARGIN: f64 = 6.0;
 
-/// Kinds that a legend distinguishes: class and colour.
-const KINDS: [(&str, &str); 10] = [
-    ("k0", "#1f77b4"),
-    ("k1", "#ff7f0e"),
-    ("k2", "#2ca02c"),
-    ("k3", "#d62728"),
-    ("k4", "#9467bd"),
-    ("k5", "#8c564b"),
-    ("k6", "#e377c2"),
-    ("k7", "#7f7f7f"),
-    ("k8", "#bcbd22"),
-    ("k9", "#17becf"),
-];
-
 /// A role, to which the style sheet gives its colour by the value that the drawing has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
@@ -40,8 +26,6 @@ pub enum Tone {
     Noise,
     /// Lines of the grid and borders between movements.
     Grid,
-    /// One of many kinds, each with its entry in a legend.
-    Of(usize),
 }
 
 impl Tone {
@@ -52,7 +36,6 @@ impl Tone {
             Self::Second => "second",
             Self::Noise => "noise",
             Self::Grid => "grid",
-            Self::Of(k) => KINDS[k % KINDS.len()].0,
         }
     }
 }
@@ -73,8 +56,6 @@ pub enum Mark {
 pub enum Scale {
     /// About zero, to the same distance.
     Symmetric,
-    /// From zero up.
-    FromZero,
     /// From the smallest to the largest, logarithmic.
     Logarithmic,
 }
@@ -164,41 +145,6 @@ impl Chart {
             ),
         );
         svg + "</svg>\n"
-    }
-
-    /// The chart as a file of its own, with a legend.
-    pub fn svg_file(&self, legend: &[(usize, &str)]) -> String {
-        let mut head = String::from(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1080\">\n<style>text { font: 20px sans-serif }\n\
-             .grid { color: #ddd } .noise { color: #a8a8a8 }\n",
-        );
-        KINDS.iter().for_each(|(class, colour)| {
-            let _ = writeln!(head, ".{class} {{ color: {colour} }}");
-        });
-        head += "</style>\n";
-        line(
-            &mut head,
-            format_args!("x=\"{LEFT}\" y=\"24\">{}", self.caption),
-        );
-        for (k, (kind, name)) in legend.iter().enumerate() {
-            let class = Tone::Of(*kind).class();
-            let y = 60 + 26 * k;
-            line(
-                &mut head,
-                format_args!("class=\"{class}\" fill=\"currentColor\" x=\"740\" y=\"{y}\">{name}"),
-            );
-        }
-        let body = self
-            .svg()
-            .replacen("<svg ", "<svg y=\"30\" width=\"720\" ", 1);
-        let height = 60.0 + TOP + PANEL_HEIGHT * self.panels.len() as f64 + BOTTOM;
-        let height = height.max(90.0 + 26.0 * legend.len() as f64);
-        head = head.replacen(
-            "width=\"1080\"",
-            &format!("viewBox=\"0 0 1080 {height}\" width=\"1080\""),
-            1,
-        );
-        head + &body + "</svg>\n"
     }
 }
 
@@ -331,7 +277,6 @@ impl Panel {
         let largest = high.max(-low).max(1e-6) * 1.08;
         match self.scale {
             Scale::Symmetric => Axis::Linear(-largest, largest),
-            Scale::FromZero => Axis::Linear(0.0, largest),
             Scale::Logarithmic if low <= high => {
                 Axis::Logarithmic(0.9 * low, (1.1 * high).max(2.0 * low))
             }
