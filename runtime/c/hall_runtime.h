@@ -35,7 +35,7 @@
 #define HALL_RUNTIME_VERSION_MAJOR 0
 
 // Minor version.
-#define HALL_RUNTIME_VERSION_MINOR 1
+#define HALL_RUNTIME_VERSION_MINOR 2
 
 // Patch version.
 #define HALL_RUNTIME_VERSION_PATCH 0

@@ -6,7 +6,7 @@ use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::fmt::Write;
 
 /// Logs that are tried: they take some eight seconds.
-const CASES: u32 = 24;
+const CASES: u32 = 16;
 const FIT: &str = "fit log.csv --bad-rows skip --out p.bin";
 const PERIOD_US: i64 = 2000;
 const SHIPPED_MOVEMENTS: usize = 57;

@@ -5,7 +5,7 @@ use runtime::{PlanarPose, Pose, Reading, Status, VerticalPose};
 /// Major version of the library that this header belongs to.
 pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
 /// Minor version.
-pub const HALL_RUNTIME_VERSION_MINOR: u32 = 1;
+pub const HALL_RUNTIME_VERSION_MINOR: u32 = 2;
 /// Patch version.
 pub const HALL_RUNTIME_VERSION_PATCH: u32 = 0;
 /// The version as one number that can be compared: major << 16, minor << 8, patch.
