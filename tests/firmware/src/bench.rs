@@ -1,16 +1,16 @@
-//! What every check starts from: images, blobs, the log and the poses that the host decodes
-//! from it; and what the frames on the bus say.
+//! The start of every check: images, blobs, the log and the poses that the host decodes from it. And the
+//! content of the frames on the bus.
 
 use crate::adc_model::{Input, Row};
 use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Answer, Command, Outcome, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::pose::status_to_bus;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
-use hal_adapters::can::{BusFrame, Layout, Message, NodeNumber};
+use hal_adapters::can::{Layout, Message, NodeNumber};
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Status};
 use std::ffi::OsString;
@@ -26,7 +26,7 @@ pub struct Words {
 }
 
 impl Words {
-    /// What the host's decoder makes of a row of the log.
+    /// The host's words of a row of the log.
     pub fn decoded(decoder: &AnyDecoder, row: Row, temperature_mc: [i32; 2]) -> Self {
         let [a, b, c, g1, g2, g3] = row;
         let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
@@ -46,7 +46,7 @@ pub const NEIGHBOUR: u32 = 5;
 /// Its servo period, us.
 pub const NEIGHBOUR_PERIOD_US: u64 = 1000;
 
-/// Everything that the script prepared.
+/// The files that the script prepared.
 pub struct Bench {
     /// The emulator's library.
     pub library: OsString,
@@ -62,15 +62,15 @@ pub struct Bench {
     pub other: Vec<u8>,
     /// The codes of the log.
     pub rows: Vec<Row>,
-    /// What `host-fit decode` makes of them.
+    /// The poses that `host-fit decode` gives.
     pub poses: Vec<Words>,
 }
 
 impl Bench {
-    /// Reads what lies in `folder`.
+    /// Reads the files in `folder`.
     ///
     /// # Panics
-    /// If a file is missing, or is not what its name says.
+    /// If a file is missing or wrong.
     pub fn read(folder: &Path, library: OsString) -> Self {
         let image = |name: &str| Image::read(&folder.join(name));
         let bytes = |name: &str| std::fs::read(folder.join(name)).expect(name);
@@ -121,7 +121,7 @@ impl Bench {
         machine
     }
 
-    /// The host's words of a tick: the log is played in a loop.
+    /// The host's words of a tick. The log is played in a loop.
     pub fn pose(&self, tick: u64) -> Words {
         self.poses[tick as usize % self.poses.len()]
     }
@@ -152,7 +152,7 @@ pub fn rows(text: &str) -> Vec<Row> {
     columns(text, names).map(row).collect()
 }
 
-/// One axis of one tick, as it came over the bus.
+/// One axis of one tick on the bus.
 #[derive(Clone, Copy, Debug)]
 pub struct Axis {
     /// Periods since the first tick.
@@ -168,7 +168,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Whether it is called valid.
+    /// Whether its status says valid.
     pub fn is_valid(&self) -> bool {
         let invalid = match self.axis {
             0..3 => Status::PLANAR_INVALID,
@@ -177,13 +177,13 @@ impl Axis {
         self.status & invalid.bits() == 0
     }
 
-    /// Whether it is of these words.
-    pub fn is_of(&self, words: &Words) -> bool {
+    /// Whether its word and status equal these.
+    pub fn equals(&self, words: &Words) -> bool {
         (self.word, self.status) == (words.words[self.axis], words.status)
     }
 }
 
-/// What was on the bus, by kind, each with its tick.
+/// Frames on the bus, by kind.
 #[derive(Default)]
 pub struct Seen {
     /// Poses.
@@ -198,11 +198,9 @@ pub struct Seen {
     pub times: Vec<(u32, u32)>,
     /// Temperatures of mount and body, m degC, each from its tick on.
     pub temperatures: Vec<(u64, [i32; 2])>,
-    /// Sound frames, and when they were sent completely, ns.
-    pub frames: Vec<(u64, BusFrame)>,
-    /// How many of them have codes.
+    /// Frames with codes.
     pub recorded: usize,
-    /// Frames whose check fails or that are none of the protocol's.
+    /// Frames with a wrong check or a foreign identifier.
     pub damaged: usize,
 }
 
@@ -216,7 +214,7 @@ const AXES: [Message; 6] = [
 ];
 
 impl Seen {
-    /// Takes what was sent since the last look.
+    /// Takes the frames since the last look.
     pub fn since_last(machine: &mut Machine) -> Self {
         let first_ns = machine.chip.first_tick_ns.unwrap_or(0);
         let mut seen = Self::default();
@@ -226,7 +224,7 @@ impl Seen {
         seen
     }
 
-    /// Runs so many ticks, and takes what was sent since the last look.
+    /// Runs some ticks, and takes the frames since the last look.
     pub fn after(machine: &mut Machine, ticks: u64) -> Self {
         machine.run_ticks(ticks);
         Self::since_last(machine)
@@ -243,8 +241,6 @@ impl Seen {
             self.damaged += 1;
             return;
         };
-        let frame = BusFrame::new(message.id(), &sent.bytes);
-        self.frames.extend(frame.map(|frame| (sent.done_ns, frame)));
         match message {
             Message::NodeStatus => self
                 .statuses
@@ -307,8 +303,8 @@ impl Seen {
         self.axes.iter().filter(|axis| axis.axis == 0)
     }
 
-    /// How the requests with this token were answered.
-    pub fn ended(&self, token: u8) -> Vec<Option<Outcome>> {
+    /// The outcomes of the requests with this token.
+    pub fn outcomes(&self, token: u8) -> Vec<Option<Outcome>> {
         let own = self.answers.iter().filter(|answer| answer.token == token);
         own.map(|answer| answer.outcome).collect()
     }
@@ -316,29 +312,6 @@ impl Seen {
     /// The last status on the bus.
     pub fn last_status(&self) -> Option<NodeStatus> {
         self.statuses.last().map(|(_, status)| *status)
-    }
-}
-
-/// Words on the bus beside those of the host.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Comparison {
-    /// Words compared.
-    pub words: u64,
-    /// Words or statuses that differ.
-    pub differing: u64,
-    /// Planar poses among them.
-    pub planar: u64,
-}
-
-impl Comparison {
-    /// Compares poses of ticks from `first` on with those that the host decodes.
-    pub fn add(&mut self, axes: &[Axis], poses: &[Words], first: u64) {
-        for axis in axes.iter().filter(|axis| axis.tick >= first) {
-            let want = poses[axis.tick as usize % poses.len()];
-            self.words += 1;
-            self.planar += u64::from(axis.axis == 0);
-            self.differing += u64::from(!axis.is_of(&want));
-        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Identifiers in the registers of bxCAN, and frames of a node as those of the table.
+//! Identifiers in the registers of bxCAN, and frames of a node with the identifiers of the table.
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use hal_adapters::can::{BusFrame, NodeNumber};
@@ -7,7 +7,7 @@ use hal_adapters::can::{BusFrame, NodeNumber};
 pub const EXTENDED: u32 = 1 << 2;
 
 /// The bits of an identifier in a register.
-pub fn bits_of(id: Id) -> u32 {
+pub fn to_register(id: Id) -> u32 {
     match id {
         Id::Standard(id) => u32::from(id.as_raw()) << 21,
         Id::Extended(id) => id.as_raw() << 3 | EXTENDED,
@@ -15,17 +15,16 @@ pub fn bits_of(id: Id) -> u32 {
 }
 
 /// The identifier in a register.
-fn id_of(bits: u32) -> Option<Id> {
+fn from_register(bits: u32) -> Option<Id> {
     match bits & EXTENDED {
         0 => StandardId::new((bits >> 21) as u16).map(Id::Standard),
         _ => ExtendedId::new(bits >> 3).map(Id::Extended),
     }
 }
 
-/// A frame of a node as one of the table; any other as it is, with the first eleven bits of
-/// its identifier.
-pub fn of_the_table(node: NodeNumber, register: u32, bytes: [u8; 8]) -> Option<(u16, [u8; 8])> {
-    let frame = BusFrame::new(id_of(register)?, &bytes)?;
+/// A frame of a node with the identifier of the table. A foreign frame keeps its first eleven bits.
+pub fn from_bus(node: NodeNumber, register: u32, bytes: [u8; 8]) -> Option<(u16, [u8; 8])> {
+    let frame = BusFrame::new(from_register(register)?, &bytes)?;
     let own = node.from_bus(&frame).unwrap_or(frame);
     let bytes = own.data().try_into().ok()?;
     match own.id {

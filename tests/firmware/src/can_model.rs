@@ -1,7 +1,7 @@
 //! The parts of bxCAN that the controller uses, from RM0090 section 32: three mailboxes, one receive
 //! store, bus states.
 
-use crate::can_identifier::{EXTENDED, bits_of, of_the_table};
+use crate::can_identifier::{EXTENDED, from_bus, to_register};
 use embedded_can::{Frame, StandardId};
 use hal_adapters::can::{BusFrame, NodeNumber};
 use std::collections::VecDeque;
@@ -197,7 +197,7 @@ impl CanModel {
 
     /// A frame from another node, as it is on the bus.
     pub fn receive_frame(&mut self, frame: &BusFrame, length_code: u8) {
-        let id = bits_of(frame.id);
+        let id = to_register(frame.id);
         let mut bytes = [0; 8];
         bytes[..frame.data().len()].copy_from_slice(frame.data());
         let [a, b, c, d, e, f, g, h] = bytes;
@@ -283,7 +283,7 @@ impl CanModel {
                 } = self.mailboxes[k];
                 let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
                 self.sent
-                    .extend(of_the_table(self.node, id, bytes).map(|(id, bytes)| Sent {
+                    .extend(from_bus(self.node, id, bytes).map(|(id, bytes)| Sent {
                         asked_ns,
                         done_ns: at,
                         id,

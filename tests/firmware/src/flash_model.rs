@@ -188,21 +188,4 @@ mod of_registers {
         flash.write(0, 4, 0, 0);
         assert_eq!(flash.read(0, 4), 0xffff_ffff);
     }
-
-    #[test]
-    fn bits_fall_until_the_sector_is_erased_and_the_core_stands_meanwhile() {
-        let (mut flash, mut now_ns) = (FlashModel::new(), 0);
-        open(&mut flash);
-        flash.write_register(CR, WORD, 0);
-        flash.write(8, 4, 0x00ff_00ff, 0);
-        flash.write(8, 4, 0x0f0f_0f0f, 0);
-        assert_eq!(flash.read(8, 4), 0x000f_000f);
-        assert_eq!(flash.read_register(SR, &mut now_ns), 0);
-        assert_eq!(now_ns, WORD_NS);
-        flash.write_register(CR, WORDS | SER | 1 << 3, now_ns);
-        flash.write_register(CR, WORDS | SER | 1 << 3 | STRT, now_ns);
-        assert_eq!(flash.read(8, 4), 0xffff_ffff);
-        assert_eq!(flash.read_register(SR, &mut now_ns), 0);
-        assert_eq!(now_ns, WORD_NS + ERASE_NS);
-    }
 }

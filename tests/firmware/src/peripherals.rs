@@ -221,12 +221,6 @@ impl Peripherals {
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
-    /// What the timer showed when the input's first row was there, us.
-    pub fn motion_start_us(&self) -> Option<u32> {
-        let since = self.adc.input.start_ns? - self.timer_started_ns?;
-        Some(((since / US) as u32).wrapping_add(self.timer_offset_us))
-    }
-
     /// Time of the next event, ns.
     pub fn next_event_ns(&self) -> Option<u64> {
         let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);

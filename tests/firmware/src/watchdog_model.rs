@@ -130,13 +130,4 @@ mod tests {
         watchdog.write(0, 0xaaaa, MS);
         assert_eq!(watchdog.bites_ns(), Some(21 * MS));
     }
-
-    #[test]
-    fn locked_registers_keep_their_values() {
-        let mut watchdog = Watchdog::new();
-        watchdog.write(0, 0xcccc, 0);
-        watchdog.write(8, 1, 0);
-        watchdog.write(0, 0xaaaa, MS);
-        assert_eq!(watchdog.bites_ns(), Some(513 * MS));
-    }
 }

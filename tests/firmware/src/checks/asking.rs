@@ -3,9 +3,11 @@
 use super::update::{KEY, talk};
 use crate::bench::{Seen, command};
 use crate::machine::Machine;
-use hal_adapters::can::command::{Command, Outcome as Ended, Request};
+use hal_adapters::can::command::{Command, Outcome, Request};
 
-/// Asks, and runs so many ticks.
+pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
+
+/// Sends a request and runs some ticks.
 pub(super) fn ask(machine: &mut Machine, request: Request, token: u8, ticks: u64) -> Seen {
     let command = Command::new(request, token);
     if command.needs_authority() {
@@ -14,20 +16,20 @@ pub(super) fn ask(machine: &mut Machine, request: Request, token: u8, ticks: u64
             .0
             .expect("a tag");
     }
-    ask_alone(machine, request, token, ticks)
+    ask_untagged(machine, request, token, ticks)
 }
 
-/// Asks without a tag.
-pub(super) fn ask_alone(machine: &mut Machine, request: Request, token: u8, ticks: u64) -> Seen {
+/// Sends a request without a tag.
+pub(super) fn ask_untagged(machine: &mut Machine, request: Request, token: u8, ticks: u64) -> Seen {
     let (id, bytes) = command(request, token, token);
     machine.chip.can.receive(id, bytes);
     Seen::after(machine, ticks)
 }
 
-/// Asks for one thing after the other; each must be answered at once, and so.
-pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) {
+/// Sends requests one after the other. Each must have this outcome at once.
+pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Outcome)]) {
     for (request, token, outcome) in asked {
         let seen = ask(machine, *request, *token, 10);
-        assert_eq!(seen.ended(*token), [Some(*outcome)], "{request:?}");
+        assert_eq!(seen.outcomes(*token), [Some(*outcome)], "{request:?}");
     }
 }

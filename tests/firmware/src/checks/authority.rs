@@ -1,13 +1,12 @@
-//! Who may: with a key whoever has it, without one whoever holds the line low.
+//! Authority: the key, or without a key the line that says that the servo is off.
 
-use super::asking::{ask, ask_alone};
-use super::commands::SERVO_OFF;
+use super::asking::{SERVO_OFF, ask, ask_untagged};
 use super::no_resets;
 use crate::bench::{Bench, Seen};
-use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::update::UpdateRequest;
 
-/// All that moves the pose, makes it invalid, resets, or leads to that.
+/// Requests that move the pose, make it invalid, reset, or lead to that.
 const REQUESTS: [Request; 7] = [
     SERVO_OFF,
     Request::Rezero { ticks: 300 },
@@ -18,25 +17,24 @@ const REQUESTS: [Request; 7] = [
     Request::Update(UpdateRequest::Activate),
 ];
 
-/// Without its tag no such request is obeyed by the controller with a key, whatever the line says;
-/// with it the servo is declared off. The other one obeys while the line is low, and not while it is
-/// high or open.
+/// The controller with a key obeys no such request without its tag, though the line is low. The controller
+/// without a key obeys while the line is low, and not while it is high or open.
 pub fn tag_or_line(bench: &Bench) {
     for (mut machine, refusal) in [
-        (bench.machine([&bench.blob, &[]]), Ended::NotAuthorised),
-        (bench.neighbour(), Ended::ServoOn),
+        (bench.machine([&bench.blob, &[]]), Outcome::NotAuthorised),
+        (bench.neighbour(), Outcome::ServoOn),
     ] {
-        machine.chip.servo_on = refusal == Ended::ServoOn;
+        machine.chip.servo_on = refusal == Outcome::ServoOn;
         Seen::after(&mut machine, 50);
         for (token, request) in (1..).zip(REQUESTS) {
-            let seen = ask_alone(&mut machine, request, token, 10);
-            assert_eq!(seen.ended(token), [Some(refusal)], "{request:?}");
+            let seen = ask_untagged(&mut machine, request, token, 10);
+            assert_eq!(seen.outcomes(token), [Some(refusal)], "{request:?}");
             assert_eq!(seen.recorded, 0);
         }
         no_resets(&machine);
         machine.chip.servo_on = false;
         machine.run_ticks(1);
         let seen = ask(&mut machine, SERVO_OFF, 20, 10);
-        assert_eq!(seen.ended(20), [Some(Ended::Done)]);
+        assert_eq!(seen.outcomes(20), [Some(Outcome::Done)]);
     }
 }

@@ -10,7 +10,8 @@ use hal_adapters::can::status::flag;
 
 const MS: u64 = 1_000_000;
 
-/// The bus goes away, by a short circuit or without any other node, and comes back. The ticks go on; old poses are never sent late.
+/// The bus fails by a short circuit, or no other node is there, and it comes back. The ticks go on; old poses
+/// are never sent late.
 pub fn goes_and_comes_back(bench: &Bench) {
     for bus in [BusState::Off, BusState::Alone] {
         let mut machine = bench.running(100);
@@ -35,18 +36,6 @@ pub fn goes_and_comes_back(bench: &Bench) {
     }
 }
 
-/// A controller that starts alone on the bus runs, and is heard once other nodes are there.
-pub fn alone_from_the_start(bench: &Bench) {
-    let mut machine = bench.machine([&bench.blob, &[]]);
-    machine.chip.can.set_bus(BusState::Alone, 0);
-    machine.run_ticks(200);
-    assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
-    machine.set_bus(BusState::Good);
-    let seen = Seen::after(&mut machine, 100);
-    same_words(&seen.axes, &bench.poses, 0, 98);
-    no_resets(&machine)
-}
-
 /// A bus that is off for 0.3 ms, between two ticks, is counted.
 pub fn off_for_less_than_a_tick(bench: &Bench) {
     let mut machine = bench.machine([&bench.blob, &[]]);
@@ -63,13 +52,13 @@ pub fn off_for_less_than_a_tick(bench: &Bench) {
     row(bench, "bus off for 0.3 ms", at, reported, &seen.axes)
 }
 
-/// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,
-/// and no newer one overtakes it.
+/// A frame that is on the wire at the end of its tick is sent once, or not at all if it fails then. No newer
+/// frame overtakes it.
 pub fn aborted_on_the_wire(bench: &Bench) {
     for fails in [false, true] {
         let mut machine = bench.running(100);
         let dropped_before = Stage::read(&machine).count("frames_dropped");
-        // Other nodes hold the bus from this tick's frames on until just before those of the next.
+        // Other nodes hold the bus until just before the frames of the next tick.
         let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
         machine.chip.can.occupy(free_ns);
         machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns);
@@ -93,7 +82,7 @@ pub fn aborted_on_the_wire(bench: &Bench) {
     }
 }
 
-/// Of more frames than the store holds one is lost, and counted: once, however many they were.
+/// More frames than the store holds: the overrun is counted once.
 pub fn received_frames_without_room(bench: &Bench) {
     let mut machine = bench.running(100);
     for token in 0..5 {

@@ -3,12 +3,12 @@
 use crate::bench::{Bench, NEIGHBOUR, NEIGHBOUR_PERIOD_US, Seen, command};
 use crate::machine::Machine;
 use hal_adapters::can::NodeNumber;
-use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::command::{Outcome, Request};
 
 const MS: u64 = 1_000_000;
 
-/// Its frames have its own identifiers and checks, and come in its own period with the poses that the
-/// host decodes; it obeys what is sent to its number, and nothing else.
+/// The neighbour has its own identifiers and period, and its poses are the host's. It obeys requests to its
+/// number and no others.
 pub fn has_identifiers_and_a_period_of_its_own(bench: &Bench) {
     let mut machine = bench.neighbour();
     let own = machine.chip.can.node;
@@ -26,10 +26,7 @@ pub fn has_identifiers_and_a_period_of_its_own(bench: &Bench) {
     );
     let host: Vec<u32> = bench.poses.iter().map(|pose| pose.words[0]).collect();
     let mut starts = host.windows(x.len()).take(2 * ticks);
-    assert!(
-        starts.any(|poses| poses == x),
-        "the poses are not those of successive rows"
-    );
+    assert!(starts.any(|poses| poses == x), "the poses skip rows");
     let times: Vec<u32> = seen.times.iter().map(|(_, us)| *us).collect();
     let mut apart = times.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]));
     let slow = 16 * NEIGHBOUR_PERIOD_US as u32;
@@ -50,9 +47,9 @@ fn identified(machine: &mut Machine, own: NodeNumber, to: NodeNumber) -> usize {
     machine.chip.can.receive(id, bytes);
     machine.chip.can.node = own;
     machine.run_ns(20 * MS);
-    let ended = Seen::since_last(machine).ended(token);
+    let ended = Seen::since_last(machine).outcomes(token);
     ended
         .iter()
-        .filter(|ended| **ended == Some(Ended::Done))
+        .filter(|ended| **ended == Some(Outcome::Done))
         .count()
 }

@@ -1,8 +1,8 @@
-//! Temperatures from the thermometers to the pose: the words of the host's decoder at what the bus says
-//! of them, and a broken one that every pose says.
+//! Temperatures from the thermometers to the pose: the host's words at the temperatures on the bus, and the
+//! mark of every pose with a broken thermometer.
 
 use super::no_resets;
-use super::parameters::of_stage_7;
+use super::parameters::for_stage_7;
 use super::start::tick_now;
 use crate::adc_model::thermometers::Wiring;
 use crate::bench::{Bench, Seen, Words};
@@ -10,17 +10,17 @@ use hal_adapters::can::status::board_check;
 use runtime::frame::MISSING_CODE;
 use runtime::{ParameterSet, Status};
 
-/// A blob that wants temperatures, about 20.1 and 21.3 degC.
+/// A blob with temperature terms, for about 20.1 and 21.3 degC.
 const WARM: &[u8] = include_bytes!("../../../../runtime/examples/warm.bin");
-/// A change of the stage has been read and is in the poses after so many ticks.
+/// Ticks from a change of temperature until it is read and in the poses.
 const READ: u64 = 52;
 /// Ticks of each step: a page of health comes once in 192.
 const TICKS: u64 = 400;
 
-/// Poses follow the temperatures, which are those of the stage; a thermometer that is open or shorted
-/// is missing, and back when it is mended.
+/// Poses follow the temperatures of the stage. An open or shorted thermometer is missing, and back when it is
+/// mended.
 pub fn follow_the_stage(bench: &Bench) {
-    let (blob, set) = of_stage_7(WARM);
+    let (blob, set) = for_stage_7(WARM);
     let mut machine = bench.machine([&blob, &[]]);
     let mut worst_mk = 0;
     let mut words = 0;
@@ -67,10 +67,10 @@ pub fn follow_the_stage(bench: &Bench) {
     no_resets(&machine);
 }
 
-/// What says on the bus that a temperature of a valid pose is missing.
+/// The bit of a valid pose on the bus with a missing temperature.
 const MARK: u32 = Status::PLANAR_HELD.bits();
 
-/// The words on the bus beside the host's at the temperatures that were sent last. Gives their number.
+/// The words equal the host's words at the last temperatures on the bus. Returns their number.
 fn same_words(bench: &Bench, set: &ParameterSet, seen: &Seen, what: &str) -> u64 {
     let decoder = set.decoder();
     let mut words = 0;
@@ -82,7 +82,7 @@ fn same_words(bench: &Bench, set: &ParameterSet, seen: &Seen, what: &str) -> u64
         };
         let row = bench.rows[axis.tick as usize % bench.rows.len()];
         let want = Words::decoded(&decoder, row, *temperature_mc);
-        assert!(axis.is_of(&want), "{what}: {axis:?}, not {want:?}");
+        assert!(axis.equals(&want), "{what}: {axis:?}, not {want:?}");
         words += 1;
     }
     assert!(words > 3 * (TICKS - READ), "{what}: only {words} words");

@@ -1,28 +1,28 @@
-//! New parameters over the bus: the host's own dialog against the program and its flash.
+//! New parameters over the bus: the host's own dialog with the program and its flash.
 
-use super::asking::{answers, ask};
-use super::commands::SERVO_OFF;
-use super::parameters::{FIELD, bytes_of, of_stage_7, poses_of};
+use super::asking::{SERVO_OFF, answers, ask};
+use super::parameters::{for_stage_7, host_poses};
 use super::same_words;
 use crate::bench::{Bench, Seen};
-use crate::flash_model::BYTES;
+use crate::flash_model::{BYTES, PowerCut};
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::BusFrame;
-use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::{NodeState, NodeStatus, board_check};
 use hal_adapters::can::update::{Key, UpdateRequest};
 use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
-use runtime::ParameterSet;
-use runtime::parameters::Text;
 use std::collections::VecDeque;
+use tests::flash_model::Cut;
 
 /// The key of the stage's program.
 pub(crate) const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// The golden example of the field model.
+const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
-/// An update may take so long, s, and its erase, in which no frame is sent.
+/// Limits of the time of an update and of its erase, in which no frame is sent, s.
 const UPDATE_S_MAX: f64 = 1.5;
 const STALL_S: std::ops::Range<f64> = 0.5..0.55;
 
@@ -36,7 +36,7 @@ pub(super) fn plan(blob: &[u8]) -> Plan {
     }
 }
 
-/// The controller on a bus that only the host is on. It ends when the power is lost.
+/// The bus between one host and the controller. It ends when the power is lost.
 pub(crate) struct Wire<'m> {
     machine: &'m mut Machine,
     cuts: u32,
@@ -78,7 +78,7 @@ impl Link for Wire<'_> {
     }
 }
 
-/// Runs a script until it is over or the power is lost; what was on the bus meanwhile.
+/// Runs a script until it ends or the power is lost. Also returns the frames meanwhile.
 pub(crate) fn talk<T>(
     machine: &mut Machine,
     script: impl FnOnce(&mut Talk<Wire<'_>>) -> Result<T, UpdateError>,
@@ -97,7 +97,7 @@ pub(crate) fn talk<T>(
     (result, talk.link.seen)
 }
 
-pub(super) fn update(machine: &mut Machine, plan: &Plan) -> (Result<Updated, UpdateError>, Seen) {
+fn update(machine: &mut Machine, plan: &Plan) -> (Result<Updated, UpdateError>, Seen) {
     talk(machine, |talk| on::update(talk, plan, &mut |_, _| {}))
 }
 
@@ -105,13 +105,10 @@ pub(super) fn updated(machine: &mut Machine, plan: &Plan) -> Updated {
     update(machine, plan).0.expect("an update")
 }
 
-/// What the controller says about itself.
 pub(super) fn identity(machine: &mut Machine) -> Identity {
-    let (identity, _) = talk(machine, |talk| {
-        let identity = on::identify(talk)?;
-        Ok(identity)
-    });
-    identity.expect("an identity")
+    talk(machine, |talk| on::identify(talk))
+        .0
+        .expect("an identity")
 }
 
 /// The blob that runs, read over the bus.
@@ -120,28 +117,12 @@ pub(super) fn running(machine: &mut Machine) -> Vec<u8> {
     read.expect("a blob").1
 }
 
-/// The next start with what is in flash now: its words are those of the host with this blob.
-fn starts_with(bench: &Bench, machine: &Machine, blob: &[u8]) {
-    let poses = poses_of(bench, &ParameterSet::from_bytes(blob).expect("sound"));
-    let mut next = bench.machine([&[], &[]]);
-    next.chip.flash.sectors = machine.chip.flash.sectors.clone();
-    let seen = Seen::after(&mut next, 200);
-    same_words(&seen.axes, &poses, 0, 198);
-}
-
-/// The field model's example as one of this stage, with the longest text of its time.
-pub(super) fn large() -> Vec<u8> {
-    let (_, mut set) = of_stage_7(FIELD);
-    set.created = Text::try_from("2026-11-22T10:00:00.000000+00:00").expect("short");
-    bytes_of(&set)
-}
-
-/// An update: in time, poses invalid meanwhile and the state "updating" sent before the erase, in which the ticks
-/// stand and the watchdog does not bite; the next power-on runs it. Another one takes its place and is
-/// activated at once, and so does the one that ran before.
+/// An update: in time, poses invalid meanwhile, and the state "updating" sent before the erase, in which the
+/// ticks stand and the watchdog does not reset. The next power-on runs the new blob; activation runs it at
+/// once. The words are the host's words with the field model.
 pub fn new_parameters(bench: &Bench) {
     let mut machine = bench.running(100);
-    let large = large();
+    let (large, set) = for_stage_7(FIELD);
     let from_ns = machine.chip.now_ns;
     let (ended, seen) = update(&mut machine, &plan(&large));
     let ended = ended.expect("an update");
@@ -165,7 +146,11 @@ pub fn new_parameters(bench: &Bench) {
     let before = before.map(|pair| pair[0].1.state);
     assert_eq!(before, Some(Some(NodeState::Updating)));
     assert_eq!(running(&mut machine), bench.blob);
-    starts_with(bench, &machine, &large);
+
+    let mut next = bench.machine([&[], &[]]);
+    next.chip.flash.sectors = machine.chip.flash.sectors.clone();
+    let seen = Seen::after(&mut next, 200);
+    same_words(&seen.axes, &host_poses(bench, &set), 0, 198);
 
     // Back again by the blob that ran before.
     for (sequence, blob) in [(2, &bench.later), (3, &bench.blob)] {
@@ -178,15 +163,12 @@ pub fn new_parameters(bench: &Bench) {
         assert_eq!(running(&mut machine), *blob);
     }
     assert_eq!((machine.panics, machine.watchdog_resets), (2, 0));
-    let (statics, stack) = (bench.image.static_bytes, machine.stack_bytes());
-    println!("RESULT firmware_update_ram_bytes={}", statics + stack);
-    assert!(
-        statics + stack <= super::figures::RAM_BYTES_MAX,
-        "{statics} + {stack} bytes of RAM"
-    );
+    let ram = bench.image.static_bytes + machine.stack_bytes();
+    println!("RESULT firmware_update_ram_bytes={ram}");
+    assert!(ram <= super::figures::RAM_BYTES_MAX, "{ram} bytes of RAM");
 }
 
-/// A key that is not the program's, the service pin, a generator of random numbers that is broken.
+/// A wrong key, the service pin, a broken generator of random numbers: nothing is written.
 pub fn refused(bench: &Bench) {
     let mut machine = bench.running(100);
     let other = Plan {
@@ -205,93 +187,132 @@ pub fn refused(bench: &Bench) {
     assert_eq!(refused, Err(UpdateError::NoRandomNumber));
     machine.chip.random.broken = false;
     assert_eq!(machine.chip.flash.sectors.operations, 0);
-    let ended = updated(&mut machine, &plan(&bench.later));
-    assert_eq!(ended.sequence, 1);
+    assert_eq!(updated(&mut machine, &plan(&bench.later)).sequence, 1);
 }
 
-/// Every transfer has a random number of its own: what was proven for one proves nothing for another.
+/// Every challenge has a new random number: a recorded tag proves nothing later.
 pub fn no_nonce_twice(bench: &Bench) {
     let mut machine = bench.running(20);
-    answers(&mut machine, &[(SERVO_OFF, 99, Ended::Done)]);
-    let mut nonces: Vec<[u32; 4]> = Vec::new();
+    answers(&mut machine, &[(SERVO_OFF, 99, Outcome::Done)]);
+    let mut words: Vec<u32> = Vec::new();
     for token in 100..104 {
-        let begin = Request::Update(UpdateRequest::Begin { bytes: 1 });
-        answers(&mut machine, &[(begin, token, Ended::Done)]);
-        let mut nonce = [0; 4];
-        for (part, word) in (0..).zip(&mut nonce) {
+        for part in 0..4 {
             let challenge = Request::Update(UpdateRequest::Challenge { part });
             let seen = ask(&mut machine, challenge, token, 10);
-            let mut answers = seen.answers.iter().filter(|answer| answer.token == token);
-            let answer = answers.next().expect("an answer");
-            assert_eq!(answer.outcome, Some(Ended::Done));
-            *word = answer.detail;
+            let answer = seen.answers.iter().find(|answer| answer.token == token);
+            let word = answer.expect("an answer").detail;
+            assert!(!words.contains(&word), "{word:x} again");
+            words.push(word);
         }
-        assert!(
-            nonces.iter().flatten().all(|word| !nonce.contains(word)),
-            "{nonce:x?} after {nonces:x?}"
-        );
-        nonces.push(nonce);
-        let abort = Request::Update(UpdateRequest::Abort);
-        answers(&mut machine, &[(abort, token, Ended::Done)]);
     }
 }
 
-/// Flash that reports an error at once or later, or of which a word does not change: the update
-/// ends with that, before and after the next start the old parameters run, and a start with sound
-/// flash takes new ones.
-pub fn flash_that_fails(bench: &Bench) {
-    // A slot in words.
-    const OTHER_SLOT: usize = BYTES / 8;
-    for (reports, stuck) in [
-        (Some(0), None),
-        (Some(50), None),
-        (None, Some(OTHER_SLOT)),
-        (None, Some(OTHER_SLOT + 50)),
-    ] {
+/// What fails in an update.
+#[derive(Clone, Copy, Debug)]
+enum Failure {
+    /// The flash reports an error at this operation.
+    Reported(usize),
+    /// A word of flash does not change.
+    Stuck(usize),
+    /// The supply drops at this operation.
+    Supply(usize),
+}
+
+fn set_failure(machine: &mut Machine, failure: Option<Failure>) {
+    let (chip, sectors) = (&mut machine.chip, |failure| match failure {
+        Some(Failure::Reported(at)) => (Some(at), None),
+        Some(Failure::Stuck(word)) => (None, Some(word)),
+        _ => (None, None),
+    });
+    let (reports, stuck) = sectors(failure);
+    (chip.flash.sectors.reports, chip.flash.sectors.stuck) = (reports, stuck);
+    chip.supply_drops_at = match failure {
+        Some(Failure::Supply(at)) => Some(at),
+        _ => None,
+    };
+}
+
+/// Operations of the flash in an update.
+fn operations(bench: &Bench) -> usize {
+    let mut machine = bench.running(20);
+    updated(&mut machine, &plan(&bench.later));
+    machine.chip.flash.sectors.operations
+}
+
+/// Flash that fails or a supply that drops ends the update with the reason. The blob that ran runs on, and
+/// sound hardware takes another update. With a low supply no further operation is done.
+pub fn hardware_that_fails(bench: &Bench) {
+    let operations = operations(bench);
+    let other_slot = BYTES / 8;
+    let fixed = [
+        Failure::Reported(0),
+        Failure::Reported(50),
+        Failure::Stuck(other_slot + 50),
+    ];
+    // Without its seal the blob counts, and a start seals it.
+    let supply = (0..operations - 1).step_by(7).map(Failure::Supply);
+    for failure in fixed.into_iter().chain(supply) {
         let mut machine = bench.running(20);
-        let sectors = &mut machine.chip.flash.sectors;
-        (sectors.reports, sectors.stuck) = (reports, stuck);
+        set_failure(&mut machine, Some(failure));
         let (ended, _) = update(&mut machine, &plan(&bench.later));
-        assert_eq!(ended, Err(UpdateError::StoreFailed));
+        match failure {
+            Failure::Supply(at) => {
+                assert_eq!(ended, Err(UpdateError::SupplyLow));
+                assert_eq!(machine.chip.flash.sectors.operations, at);
+                Seen::since_last(&mut machine);
+                let checks = Seen::after(&mut machine, 200).page(11);
+                assert_eq!(checks, Some(board_check::SUPPLY_LOW));
+            }
+            _ => assert_eq!(ended, Err(UpdateError::StoreFailed), "{failure:?}"),
+        }
         assert_eq!(running(&mut machine), bench.blob);
-        machine.reset_by_pin();
-        machine.run_ticks(40);
-        assert_eq!(running(&mut machine), bench.blob);
-        let sectors = &mut machine.chip.flash.sectors;
-        (sectors.reports, sectors.stuck) = (None, None);
+        set_failure(&mut machine, None);
         machine.power_cycle();
         machine.run_ticks(20);
+        assert_eq!(running(&mut machine), bench.blob, "{failure:?}");
         updated(&mut machine, &plan(&bench.later));
-        starts_with(bench, &machine, &bench.later);
     }
 }
 
-/// The supply drops at any operation of an update: no further one is done, the answer says why, the blob that
-/// was there runs, and with a sound supply another update is taken.
-pub fn supply_that_drops(bench: &Bench) {
-    let mut whole = bench.running(20);
-    updated(&mut whole, &plan(&bench.later));
-    let operations = whole.chip.flash.sectors.operations;
-    // Without its seal the blob counts, and a start seals it.
-    for at in 0..operations - 1 {
+/// Cuts of the power before, inside and after operations of the flash, and again in the start that follows:
+/// the old or the new blob runs, and for certain the new blob once the update was answered. Another update
+/// is possible.
+pub fn power_cuts(bench: &Bench) {
+    let operations = operations(bench);
+    let (mut old, mut new) = (0, 0);
+    // The drop of the old slot, its erase, the first words, a word of the blob; check, commit word, seal.
+    let first = [0, 1, 2, operations / 2];
+    let places = first.into_iter().chain(operations - 3..operations);
+    let all = places.flat_map(|at| Cut::ALL.map(|place| (at, place)));
+    for (seed, (at, place)) in (1..).zip(all) {
+        let cut = PowerCut { at, place, seed };
+        let again = PowerCut { at: 0, ..cut };
+        let cuts = if place == Cut::Inside { 2 } else { 1 };
         let mut machine = bench.running(20);
-        machine.chip.supply_drops_at = Some(at);
-        let (ended, _) = update(&mut machine, &plan(&bench.later));
-        assert_eq!(ended, Err(UpdateError::SupplyLow));
-        assert_eq!(machine.chip.flash.sectors.operations, at);
-        if at % 16 == 0 {
-            Seen::since_last(&mut machine);
-            let checks = Seen::after(&mut machine, 200).page(11);
-            assert_eq!(checks, Some(board_check::SUPPLY_LOW));
-            machine.chip.supply_drops_at = None;
-            machine.power_cycle();
-            machine.run_ticks(20);
-            assert_eq!(running(&mut machine), bench.blob);
-            updated(&mut machine, &plan(&bench.later));
-        }
+        machine.chip.flash.cut_at(&[cut, again][..cuts]);
+        let (_ended, _) = update(&mut machine, &plan(&bench.later));
+        machine.run_ticks(20);
+        assert!(machine.power_cuts > 0, "{cut:?}");
+        let found = running(&mut machine);
+        assert!(
+            found == bench.later
+                || found == bench.blob && (at, place) != (operations - 1, Cut::After),
+            "after {cut:?}"
+        );
+        (old, new) = match found == bench.blob {
+            true => (old + 1, new),
+            false => (old, new + 1),
+        };
+        machine.chip.flash.cut_at(&[]);
+        let (large, _) = for_stage_7(FIELD);
+        assert!(
+            updated(&mut machine, &plan(&large)).is_stored,
+            "after {cut:?}"
+        );
     }
     println!(
-        "RESULT firmware_supply_drops={} written_below=0",
-        operations - 1
+        "RESULT firmware_power_cuts={} old={old} new={new}",
+        old + new
     );
+    assert!(old > 0 && new > 0, "all cuts ended alike");
 }
