@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`flash_model`] | two sectors of flash, and what a cut of the power leaves in them |
+//! | [`flash_model`] | two sectors of flash, and cuts of the power |
 //! | [`job`] | frames in, words out: the files that host and target exchange |
 //! | [`motion`] | frames and parameters for a job: a log, random codes, random words |
 //! | [`compare`] | the host's words of a job beside the target's |
@@ -12,7 +12,8 @@
 //! | [`node`] | a node that takes new parameters over the bus |
 //! | [`trace`] | executed instructions, counted from an emulator's log |
 
-use firmware::store::{FlashFault, SLOT_BYTES};
+use firmware::store::{Flash, SLOT_BYTES};
+use hal_adapters::can::update::NotWritten;
 use std::error::Error;
 use std::process::ExitCode;
 

@@ -4,7 +4,6 @@
 
 use crate::flash_model::FlashModel;
 use crate::random::Random;
-use firmware::fpu::FpuSettings;
 use firmware::node::{Facts, Node as Ticking, Parameters};
 use firmware::outbox::Outbox;
 use firmware::records::{Choice, Loaded, Records};
@@ -37,15 +36,6 @@ pub struct Node {
     resets: u32,
 }
 
-/// This machine's FPU, which nothing changes.
-struct Unchanged;
-
-impl FpuSettings for Unchanged {
-    fn restore(&mut self) -> bool {
-        false
-    }
-}
-
 impl Node {
     /// A controller of the stage `serial`, if its program knows that, with this flash, after
     /// power-on.
@@ -55,7 +45,7 @@ impl Node {
         flash: FlashModel,
         seed: u64,
     ) -> Self {
-        let before = Before::of(Cause::PowerOn, None);
+        let before = Before::new(Cause::PowerOn, None);
         let (ticking, records, statics) = start(flash, (serial, key), &before);
         let retained = retained(&before, &records, &ticking);
         Self {
@@ -86,7 +76,7 @@ impl Node {
             servo_off_pin: Some(true),
             ..Facts::default()
         };
-        (self.ticking).tick(sample, &facts, &mut Unchanged, &mut self.outbox);
+        (self.ticking).tick(sample, &facts, &mut self.outbox);
         for frame in received.into_iter().take(TAKEN_PER_TICK) {
             let nonce = [(); 4].map(|()| self.random.bits() as u32);
             (self.ticking).take(&frame, &mut self.outbox, &mut self.records, Some(nonce));
@@ -138,7 +128,7 @@ impl Node {
     }
 
     fn start(&mut self, cause: Cause) {
-        let before = Before::of(cause, Retained::from_words(&self.retained));
+        let before = Before::new(cause, Retained::from_words(&self.retained));
         let mut flash = self.flash().clone();
         flash.power_on();
         let statics;
@@ -165,7 +155,7 @@ impl Node {
         let (records, _) = Records::start(&mut flash, Choice::Newest, self.serial);
         let newest = records.newest()?;
         [0, 1].into_iter().find_map(|slot| {
-            let image = Image::read(&mut flash, slot).ok()?;
+            let image = Image::read(records.flash(), slot);
             let stored = image.stored(slot)?;
             let is_newest = (stored.sequence, stored.crc) == (newest.sequence, newest.crc);
             is_newest.then(|| image.blob()[..stored.bytes as usize].to_vec())

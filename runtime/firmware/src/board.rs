@@ -20,14 +20,14 @@ use stm32f4xx_hal::time::Hertz;
 /// The converter: any part with a driver that implements [`FrameSampler`].
 pub type Converter = hal_adapters::adc::Ads131m08<SpiDevice, ControlPin>;
 
-/// Which input of the converter carries which sensor.
+/// The inputs of the sensors.
 const CHANNELS: Channels = match Channels::IN_ORDER.with_thermometers(THERMOMETERS) {
     Some(channels) => channels,
     None => panic!("a thermometer needs a free input"),
 };
 
-/// What the supply of the thermistor and of its resistor give: 68 kOhm let its voltage stay within the
-/// range of the ADS131M08 above -10 degC.
+/// Codes of the thermistor with 68 kOhm to 3.3 V: its voltage stays within the range of the ADS131M08 above -10
+/// degC.
 const THERMISTOR: [i32; ntc_103at::POINTS] = ntc_103at::codes(&Converter::INPUT, 3.3, 68e3);
 const LINEAR: [i32; 2] = tmp235::codes(&Converter::INPUT);
 
@@ -63,13 +63,13 @@ pub fn servo_is_off(pin: &ServoPin) -> Option<bool> {
 
 /// Frequency of the crystal.
 const CRYSTAL_HZ: u32 = 8_000_000;
-/// Frequency of the core after a reset, MHz: that of the internal oscillator.
+/// Frequency of the core after a reset, MHz: the internal oscillator.
 pub const INTERNAL_MHZ: u32 = 16;
 /// Frequency of the core.
 pub const CORE_HZ: u32 = 168_000_000;
 /// Clock of the first peripheral bus.
 const BUS_1_HZ: u32 = CORE_HZ / 4;
-/// Clock of the second peripheral bus, from which SPI1 divides its own.
+/// Clock of the second peripheral bus; SPI1 divides it.
 const BUS_2_HZ: u32 = CORE_HZ / 2;
 /// Clock of the timers on the first peripheral bus: twice that bus.
 pub const TIMER_HZ: u32 = 2 * BUS_1_HZ;
@@ -88,9 +88,9 @@ pub fn clocks(crystal: bool) -> Config {
         .pclk2(Hertz::from_raw(BUS_2_HZ))
 }
 
-/// What the board allows: data come up to 20 ns after the edge that shifts them (ADS131M08, 3 V)
-/// and must be there 6.5 ns (F405) before the edge that samples them, half a period later. 10.5 MHz
-/// leaves 21 ns for wires and buffers, 21 MHz would be 3 ns too fast.
+/// Fastest clock of the board: data come up to 20 ns after the edge that shifts them (ADS131M08, 3 V) and must be there
+/// 6.5 ns (F405) before the edge that samples them, half a period later. At 10.5 MHz 21 ns remain for wires and
+/// buffers; 21 MHz would be 3 ns too fast.
 const SPI_HZ_MAX: u32 = 12_000_000;
 
 /// SPI clock: the fastest that board and converter allow. SPI divides its bus clock by a power of
@@ -103,7 +103,7 @@ const SPI_HZ: u32 = {
     hz
 };
 
-/// Periods of the clock of the first peripheral bus in a quantum, of which a bit has 14.
+/// Periods of the clock of the first peripheral bus in a quantum. A bit has 14 quanta.
 pub const CAN_PRESCALER: u16 = 3;
 
 /// 1 Mbit/s: 42 = 3 * 14. By the crystal sampled at 86 % with the least resynchronisation; by the
@@ -117,85 +117,36 @@ pub const CAN_PRESCALER: u16 = 3;
 /// 85 degC (DS8626, HSI oscillator characteristics): in a laboratory that is enough. Elsewhere it
 /// may not be; see `Bus::new`.
 ///
-/// Quanta before the sample, besides the first; after the sample; and by which a bit is lengthened or
-/// shortened at most, to follow other nodes.
+/// Returns the quanta before the sample, without the first; the quanta after it; and the largest resynchronisation.
 pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
     if crystal { (11, 2, 1) } else { (9, 4, 4) }
 }
 
-/// What still counts as rest at the zero. A stage whose servo is off may rest lower than it floats, or
-/// tilted: then `vertical_max` is to hold where it rests, and so must the range of its calibration.
+/// Limits of rest at the zero. A stage may rest lower or tilted while its servo is off: then `vertical_max` and the range
+/// of its calibration must hold this position.
 pub fn rezero_limits() -> ZeroOffsetSettings {
     ZeroOffsetSettings::default()
 }
 
-/// Longest serial number, as in [`runtime::parameters::Text`].
-const TEXT_BYTES: usize = 32;
+/// The controller's stage, `STAGE_SERIAL` in the environment of the build: blobs of other stages are refused.
+pub const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
 
-/// What differs from stage to stage. In `.data`, which the program's hash leaves out: programs that
-/// differ in nothing else have the same, and it says nothing about the key.
-struct Stage {
-    /// Filled up with zeros.
-    serial: [u8; TEXT_BYTES],
-    key: Key,
-    node: NodeNumber,
-}
-
-#[unsafe(link_section = ".data.STAGE")]
-static STAGE: Stage = Stage {
-    serial: match option_env!("STAGE_SERIAL") {
-        Some(serial) => padded(serial),
-        None => [0; TEXT_BYTES],
-    },
-    key: match option_env!("STAGE_KEY") {
-        Some(digits) => key(digits),
-        None => [0; 16],
-    },
-    node: match option_env!("STAGE_NODE") {
-        Some(digits) => match NodeNumber::new(number(digits)) {
-            Some(node) => node,
-            None => panic!("STAGE_NODE is to be 0 to 262143"),
-        },
-        None => NodeNumber::TABLE,
-    },
+/// The key of the stage, `STAGE_KEY` in the environment of the build: 32 hexadecimal digits. Without a key every sender
+/// on the bus may replace the parameters while the servo is off.
+pub const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
+    Some(digits) => Some(key(digits)),
+    None => None,
 };
 
-/// Read as if it could be anything, so that no part of it is copied into the program.
-fn stage() -> &'static Stage {
-    core::hint::black_box(&STAGE)
-}
-
-/// The stage that this controller belongs to, if the program was built with `STAGE_SERIAL` in
-/// the environment: blobs of other stages are refused.
-pub fn stage_serial() -> Option<&'static str> {
-    let serial = stage().serial.split(|byte| *byte == 0).next()?;
-    core::str::from_utf8(serial)
-        .ok()
-        .filter(|serial| !serial.is_empty())
-}
-
-/// The key of the stage, if the program was built with `STAGE_KEY` in the environment: 32
-/// hexadecimal digits. Without one, whoever can send on the bus may replace the parameters.
-pub fn stage_key() -> Option<Key> {
-    option_env!("STAGE_KEY").map(|_| stage().key)
-}
-
-/// The stage's number on its bus, `STAGE_NODE` in the environment of the build: 0, the default, sends
-/// the identifiers of the table, any other extended ones.
-pub fn stage_node() -> NodeNumber {
-    stage().node
-}
-
-const fn padded(serial: &str) -> [u8; TEXT_BYTES] {
-    let mut bytes = [0; TEXT_BYTES];
-    assert!(serial.len() <= TEXT_BYTES, "STAGE_SERIAL is too long");
-    let mut k = 0;
-    while k < serial.len() {
-        bytes[k] = serial.as_bytes()[k];
-        k += 1;
-    }
-    bytes
-}
+/// The stage's number on its bus, `STAGE_NODE` in the environment of the build. The default, 0, has the standard
+/// identifiers of the table.
+pub const STAGE_NODE: NodeNumber = match option_env!("STAGE_NODE") {
+    Some(digits) => match NodeNumber::new(number(digits)) {
+        Some(node) => node,
+        None => panic!("STAGE_NODE is to be 0 to 262143"),
+    },
+    None => NodeNumber::TABLE,
+};
 
 const fn key(digits: &str) -> Key {
     assert!(digits.len() == 32, "STAGE_KEY needs 32 hexadecimal digits");
@@ -217,7 +168,7 @@ const fn number(text: &str) -> u32 {
     }
 }
 
-/// What hangs on the pins.
+/// The parts on the pins.
 pub struct Parts {
     /// The converter, not started yet.
     pub converter: Converter,
@@ -227,13 +178,12 @@ pub struct Parts {
     pub led: Led,
     /// Whether the servo is off.
     pub servo: ServoPin,
-    /// Bits of [`board_check`]: lines to the converter that must be high before the program drives
-    /// them, and are not pulled up by 10 kOhm or less, against an internal resistor of 30 kOhm at
-    /// least.
+    /// Bits of [`board_check`]: lines to the converter without a pull-up of 10 kOhm or less, found against an internal
+    /// resistor of 30 kOhm at least. They must be high before the program drives them.
     pub not_pulled_up: u32,
 }
 
-/// Time for a line to follow the internal resistor of 30 to 50 kOhm, us: three times that of 50 pF.
+/// Time for a line to follow the internal resistor of 30 to 50 kOhm, us: three time constants with 50 pF.
 const PULL_US: u32 = 8;
 
 /// Sets the pins up.
@@ -255,7 +205,7 @@ pub fn set_up(
     select.set_speed(Speed::VeryHigh);
     let mut control = control.into_push_pull_output_in_state(PinState::High);
     control.set_speed(Speed::High);
-    // A converter that is not selected leaves its output open.
+    // The output of an unselected converter is open.
     let pins = (
         Some(gpioa.pa5.into_alternate().speed(Speed::VeryHigh)),
         Some(gpioa.pa6.into_alternate().internal_resistor(Pull::Up)),

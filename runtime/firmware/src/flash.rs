@@ -3,10 +3,8 @@
 
 use crate::supply::Supply;
 use cortex_m::asm;
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
-};
-use firmware::store::{FlashFault, SLOT_BYTES, SLOTS};
+use firmware::store::{Flash, SLOT_BYTES, SLOTS};
+use hal_adapters::can::update::NotWritten;
 use stm32f4xx_hal::pac::FLASH;
 
 const BYTES: usize = SLOTS * SLOT_BYTES as usize;
@@ -50,9 +48,9 @@ impl Sectors {
 
     /// Opens FLASH_CR, does an operation, and locks it again. The operation gives the number of
     /// looks until it is given up. It sets PSIZE to x32, which needs at least 2.7 V (table 13).
-    fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), FlashFault> {
+    fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), NotWritten> {
         if self.supply.is_low() {
-            return Err(FlashFault::SupplyLow);
+            return Err(NotWritten::SupplyLow);
         }
         let registers = &self.registers;
         if registers.cr().read().lock().bit_is_set() {
@@ -64,7 +62,7 @@ impl Sectors {
         // SAFETY: bits that are cleared by writing 1.
         registers.sr().write(|w| unsafe { w.bits(END | ERRORS) });
         let mut looks = start(registers);
-        // What is read afterwards must be read afterwards.
+        // Reads come after the operation.
         asm::dsb();
         let mut status = registers.sr().read().bits();
         while status & BUSY != 0 && looks > 0 {
@@ -75,75 +73,59 @@ impl Sectors {
             w.pg().clear_bit().ser().clear_bit();
             w.lock().set_bit()
         });
-        // A write to flash changes the data cache as well, and an erase does not (section 3.6.4):
-        // what is read back is to come from flash. The cache is reset only while it is off
-        // (section 3.5.2).
+        // A write to flash changes the data cache, and an erase does not (section 3.6.4); bytes are to be
+        // read back from flash. The cache is reset only while it is off (section 3.5.2).
         registers.acr().modify(|_, w| w.dcen().clear_bit());
         registers.acr().modify(|_, w| w.dcrst().set_bit());
         registers.acr().modify(|_, w| w.dcrst().clear_bit());
         registers.acr().modify(|_, w| w.dcen().set_bit());
         match status & (BUSY | ERRORS) {
-            // What was done meanwhile may not last.
-            0 if self.supply.is_low() => Err(FlashFault::SupplyLow),
+            // The operation may not last.
+            0 if self.supply.is_low() => Err(NotWritten::SupplyLow),
             0 => Ok(()),
-            status => Err(FlashFault::Reported { status }),
+            _ => Err(NotWritten::Failed),
         }
     }
 }
 
-impl ErrorType for Sectors {
-    type Error = FlashFault;
+/// Whether bytes lie within the sectors.
+const fn is_inside(offset: u32, bytes: usize) -> bool {
+    offset as usize + bytes <= BYTES
 }
 
-impl ReadNorFlash for Sectors {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFault> {
-        check_read(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
-        for (k, byte) in bytes.iter_mut().enumerate() {
-            // SAFETY: within the sectors of the linker's script, which hold nothing else.
-            *byte = unsafe { Self::address(offset).add(k).read_volatile() };
+impl Flash for Sectors {
+    fn read(&self, offset: u32, bytes: &mut [u8]) {
+        if is_inside(offset, bytes.len()) {
+            for (k, byte) in bytes.iter_mut().enumerate() {
+                // SAFETY: within the sectors of the linker's script, which hold nothing else.
+                *byte = unsafe { Self::address(offset).add(k).read_volatile() };
+            }
         }
-        Ok(())
     }
 
-    fn capacity(&self) -> usize {
-        BYTES
-    }
-}
-
-impl NorFlash for Sectors {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SLOT_BYTES as usize;
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashFault> {
-        check_write(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
-        for (word, offset) in bytes.as_chunks().0.iter().zip((offset..).step_by(4)) {
-            self.operate(|registers| {
-                (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
-                let address = Self::address(offset).cast::<u32>();
-                // SAFETY: within the sectors, which the linker's script aligns to words. A write
-                // to flash programs it while PG is set (section 3.6.4).
-                unsafe { address.write_volatile(u32::from_le_bytes(*word)) };
-                WORD_LOOKS
-            })?;
+    fn program(&mut self, offset: u32, word: [u8; 4]) -> Result<(), NotWritten> {
+        if !offset.is_multiple_of(4) || !is_inside(offset, 4) {
+            return Err(NotWritten::Failed);
         }
-        Ok(())
+        self.operate(|registers| {
+            (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
+            let address = Self::address(offset).cast::<u32>();
+            // SAFETY: within the sectors, which the linker's script aligns to words. A write to flash
+            // programs it while PG is set (section 3.6.4).
+            unsafe { address.write_volatile(u32::from_le_bytes(word)) };
+            WORD_LOOKS
+        })
     }
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashFault> {
-        check_erase(self, from, to).map_err(FlashFault::Argument)?;
-        for slot in from / SLOT_BYTES..to / SLOT_BYTES {
-            self.operate(|registers| {
-                // SAFETY: the numbers of the two sectors, 1 and 2 (table 5).
-                registers.cr().modify(|_, w| unsafe {
-                    w.psize().psize32().ser().set_bit();
-                    w.snb().bits(1 + slot as u8)
-                });
-                registers.cr().modify(|_, w| w.strt().set_bit());
-                SECTOR_LOOKS
-            })?;
-        }
-        Ok(())
+    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
+        self.operate(|registers| {
+            // SAFETY: the number of a sector, 1 or 2 (table 5).
+            registers.cr().modify(|_, w| unsafe {
+                w.psize().psize32().ser().set_bit();
+                w.snb().bits(1 + (slot & 1))
+            });
+            registers.cr().modify(|_, w| w.strt().set_bit());
+            SECTOR_LOOKS
+        })
     }
 }

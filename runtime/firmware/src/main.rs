@@ -3,17 +3,15 @@
 //!
 //! Converter, pins, clocks and bit timing: [`board`]. What a tick does: the library `firmware`.
 //!
-//! - There are two interrupts of the same priority. Neither interrupts the other, so shared
-//!   state needs no lock. RTIC checks this at compile time: state moves from `init` into the
-//!   task that owns it, without `unsafe` and without cells. There are no software tasks and
-//!   no timer queue.
+//! - Two interrupts have the same priority, so shared state needs no lock. RTIC checks this at compile time:
+//!   state moves from `init` into the task that owns it, without `unsafe` and without cells.
 //! - TIM2 gives the ticks on an absolute schedule. A tick triggers the converter and is
 //!   finished by a second alarm when the codes have settled; it does not wait in between.
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
-//! - A panic, a fault of the core, a stack that overflows and a crystal that stops are noted in
-//!   RAM that a reset leaves alone, and reset. The next start reports them. No tick can reach a
-//!   panic: those that the linker keeps are in the HAL's set-up of the clocks.
+//! - A panic, a fault of the core, a stack overflow and a crystal that stops are noted in RAM that survives a
+//!   reset, and reset. The next start reports them. No tick can reach a panic: the linker keeps only panics of
+//!   the HAL's set-up of the clocks.
 #![no_std]
 #![no_main]
 
@@ -47,32 +45,31 @@ impl DelayNs for Cycles {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::start::{self, ZeroKeeper};
+    use super::start;
     use super::timer::{SETTLED, TICK};
     use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
     use super::{random::Random, supply::Supply, wait::Stopwatch, watchdog::Watchdog};
     use core::mem::MaybeUninit;
     use cortex_m::peripheral::SCB;
     use firmware::acquisition::Acquisition;
-    use firmware::fpu::{Fpu, FpuSettings};
+    use firmware::fpu;
     use firmware::node::{Facts, Node, Parameters, SampleFault};
-    use firmware::records::Loaded;
-    use firmware::records::Records;
+    use firmware::records::{Loaded, Records};
     use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, TICKS_PER_S, Tick};
     use firmware::start_up::PROVEN_TICKS;
-    use firmware::telemetry::{Ended, STAGE};
+    use firmware::telemetry::STAGE;
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::Layout;
     use hal_adapters::can::status::{bit, board_check};
     use hal_adapters::can::update::Identity;
-    use runtime::Status;
+    use runtime::{PlanarPose, Status};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
 
     const CORE_MHZ: u32 = board::CORE_HZ / 1_000_000;
-    /// Where no other node acknowledges the answers, a reset or an erase waits no longer.
+    /// Longest wait of a reset or an erase for the answers to leave.
     const SILENCE_TICKS_MAX: u32 = TICKS_PER_S / 5;
 
     #[shared]
@@ -85,15 +82,16 @@ mod app {
     struct Local {
         clock: Clock,
         schedule: Schedule,
-        /// The tick whose codes are still settling.
+        /// The tick while its codes settle.
         open: Option<Tick>,
         acquisition: Acquisition<Converter>,
         node: &'static mut Node<'static>,
         facts: Facts,
-        zero: ZeroKeeper,
+        /// The zero deviation in the retained record.
+        zero: PlanarPose<f32>,
         records: Records<flash::Sectors>,
         random: Random,
-        /// Ticks for which a reset or an erase has waited until the answers have left.
+        /// Ticks that a reset or an erase has waited for the answers to leave.
         silence_waits: u32,
         watchdog: Watchdog,
         stopwatch: Stopwatch,
@@ -122,18 +120,18 @@ mod app {
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let serial = (device.SPI1, device.DMA2);
         let parts = board::set_up(ports, serial, device.CAN1, &mut rcc);
-        let bus = Bus::new(parts.can, board::stage_node(), crystal, &mut stopwatch);
+        let bus = Bus::new(parts.can, board::STAGE_NODE, crystal, &mut stopwatch);
         let random = Random::new(device.RNG, &mut rcc);
 
         watchdog.feed();
         fault::begin(Step::Parameters);
         let options = device.FLASH.optcr().read().bits();
         let sectors = flash::Sectors::new(device.FLASH, supply);
-        let (mut records, refusal) = Records::start(sectors, before.choice, board::stage_serial());
-        // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
-        Fpu.restore();
-        let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
-        // What does not decode does not run.
+        let (mut records, refusal) = Records::start(sectors, before.choice, board::STAGE_SERIAL);
+        // After a warm start the FPU may have any settings. These give the host's arithmetic.
+        fpu::restore();
+        let sound = runtime::arithmetic::check().is_ok() && fpu::defaults_are_sound();
+        // Without sound arithmetic no blob runs.
         let loaded = match sound {
             true => records.load(before.choice, cx.local.loaded),
             false => None,
@@ -142,18 +140,22 @@ mod app {
         let stop = before.stop(loaded.is_some());
         let parameters = Parameters::at_start(loaded, refusal, stop, sound);
         let identity = Identity {
-            serial: board::stage_serial(),
-            key: board::stage_key(),
+            serial: board::STAGE_SERIAL,
+            key: board::STAGE_KEY,
             program_version: board::PROGRAM_VERSION,
         };
         let node = node(cx.local.node_place, parameters, before.by_fault, identity);
         let zero_lost = before.restore_zero(node, blob);
-        let zero = ZeroKeeper::new(node.decodes().then_some(blob), node.zero());
+        let zero = node.zero();
+        // Without a running blob the record stays for a later start.
+        if node.decodes() {
+            fault::update(|record| record.runs(blob, zero));
+        }
 
         watchdog.feed();
         fault::begin(Step::Converter);
         let mut acquisition = Acquisition::new(parts.converter);
-        // If the converter is not there yet, the ticks report why and start it again.
+        // The ticks report a failure and start it again.
         let _ = acquisition.start(&mut Cycles);
 
         let checks = parts.not_pulled_up
@@ -193,8 +195,8 @@ mod app {
         )
     }
 
-    /// Puts the node where it stays. In a function of its own, what that takes of the stack is not
-    /// there while the parameters are read.
+    /// Puts the node into its static. In a function of its own, because its stack is not needed while the parameters are
+    /// read.
     #[inline(never)]
     fn node(
         place: &'static mut MaybeUninit<Node<'static>>,
@@ -204,8 +206,7 @@ mod app {
     ) -> &'static mut Node<'static> {
         let layout = Layout::for_bits(Converter::CODE_BITS);
         let node = Node::new(parameters, by_fault, layout, identity);
-        let node = node.rezeroing_within(board::rezero_limits());
-        place.write(node.recording(cfg!(feature = "record")))
+        place.write(node.with_rezero_limits(board::rezero_limits()))
     }
 
     #[idle]
@@ -257,7 +258,7 @@ mod app {
             .acquisition
             .sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
-        // The frames that announce it have left, or nobody listens.
+        // Its announcement has left, or nobody listens.
         let is_silent = bus.is_idle() || *local.silence_waits > SILENCE_TICKS_MAX;
         let waits = local.node.wants_reset() || local.node.is_storing();
         *local.silence_waits = if waits { *local.silence_waits + 1 } else { 0 };
@@ -272,16 +273,17 @@ mod app {
         (local.facts).note(board_check::CAN_NOT_STARTED, !bus.takes_part());
         local.facts.servo_off_pin = board::servo_is_off(local.servo);
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
-        let reading = local
-            .node
-            .tick(sample, local.facts, &mut Fpu, &mut bus.outbox);
+        let reading = local.node.tick(sample, local.facts, &mut bus.outbox);
         let is_missing = reading.status.any(Status::TEMPERATURE_MISSING);
         (local.facts).note(board_check::TEMPERATURE_MISSING, is_missing);
-        // After the pose, whose frames then find the mailboxes empty.
+        // After the pose: its frames find the mailboxes empty.
         bus.receive(local.node, local.records, local.random);
         bus.send();
         local.led.set_state(PinState::from(local.node.light()));
-        local.zero.keep(local.node.zero());
+        if *local.zero != local.node.zero() {
+            *local.zero = local.node.zero();
+            fault::update(|record| record.zero = *local.zero);
+        }
         if local.node.ticks() == PROVEN_TICKS {
             fault::update(Retained::prove);
         }
@@ -293,23 +295,17 @@ mod app {
         }
         bus.send();
 
-        STAGE.put(&Ended {
-            sequence: tick.sequence,
-            time_us: tick.started_us,
-            reading,
-            counters: [
-                *local.overrun_ticks,
-                local.acquisition.faults(),
-                local.acquisition.starts(),
-                bus.sent(),
-                bus.outbox.dropped(),
-                bus.overruns(),
-                local.node.fpu_restored(),
-            ],
-        });
-        let now_us = local.clock.now_us();
-        STAGE.put_duration(now_us.wrapping_sub(tick.started_us));
-        if tick.on_schedule(now_us) {
+        let counters = [
+            *local.overrun_ticks,
+            local.acquisition.faults(),
+            local.acquisition.starts(),
+            bus.sent(),
+            bus.outbox.dropped(),
+            bus.overruns(),
+            local.node.fpu_restored(),
+        ];
+        STAGE.put(tick.sequence, tick.started_us, &reading, counters);
+        if tick.on_schedule(local.clock.now_us()) {
             local.watchdog.feed();
         } else {
             *local.overrun_ticks = local.overrun_ticks.saturating_add(1);

@@ -1,12 +1,10 @@
-//! One tick of the stage controller: codes in, frames out; and what it is asked for.
+//! One tick of the stage controller: codes in, frames out; and its commands.
 
-mod parameters;
 mod state;
 
-pub use parameters::Parameters;
-pub use state::{REASON_CHANNEL, REASON_FPU, REASON_OTHER_SLOT, SampleFault};
+pub use state::{Parameters, SampleFault};
 
-use crate::fpu::FpuSettings;
+use crate::fpu;
 use crate::outbox::Outbox;
 use crate::schedule::TICKS_PER_S;
 use embedded_can::Frame;
@@ -21,7 +19,6 @@ use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service};
 use runtime::tracker::Health;
 use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{AnyDecoder, PlanarPose, PoseTracker, RawFrame, Reading, Status};
-use state::state_of;
 
 /// The reading of a tick that gave no pose.
 const NOTHING: Reading = Reading {
@@ -32,22 +29,22 @@ const NOTHING: Reading = Reading {
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
 
-/// What the rest of the program and the board give the node in each tick.
+/// Input of a tick from the rest of the program and the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
     /// Ticks that came late or not at all.
     pub missed_ticks: u32,
     /// Times the bus was off.
     pub bus_off: u32,
-    /// Whether the service pin says that the servo is off; `None`: this board has no such pin. Then a
-    /// node without a key takes the servo for on: whoever can send could declare it off.
+    /// Whether the service pin says that the servo is off; `None` without such a pin. A node without pin and key takes
+    /// the servo for on: any sender could declare it off.
     pub servo_off_pin: Option<bool>,
-    /// What the start-up found.
+    /// Findings of the start-up.
     pub board: BoardFacts,
 }
 
 impl Facts {
-    /// Notes what a check of the board, a bit of [`board_check`], finds now.
+    /// Notes a check of the board, a bit of [`board_check`].
     pub const fn note(&mut self, check: u32, fails: bool) {
         self.board.board_checks &= !check;
         self.board.board_checks |= bit(check, fails);
@@ -99,18 +96,9 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Sends codes from the start, as if asked for.
-    #[must_use]
-    pub fn recording(self, is_on: bool) -> Self {
-        Self {
-            service: self.service.with_recording(is_on),
-            ..self
-        }
-    }
-
     /// Re-zeros within the limits of this stage.
     #[must_use]
-    pub fn rezeroing_within(self, limits: ZeroOffsetSettings) -> Self {
+    pub fn with_rezero_limits(self, limits: ZeroOffsetSettings) -> Self {
         Self {
             service: self.service.with_rezero_limits(limits),
             ..self
@@ -119,7 +107,7 @@ impl<'d> Node<'d> {
 
     /// The zero deviation that is subtracted, as a pose.
     pub const fn zero(&self) -> PlanarPose<f32> {
-        match self.parameters.servo() {
+        match &self.parameters.servo {
             Some(servo) => servo.zero(),
             None => PlanarPose::ZERO,
         }
@@ -128,14 +116,14 @@ impl<'d> Node<'d> {
     /// Subtracts a zero deviation that was kept over a reset. Without parameters, or if it is
     /// not finite, nothing happens.
     pub fn restore_zero(&mut self, zero: PlanarPose<f32>) {
-        if let Some(servo) = self.parameters.servo_mut() {
+        if let Some(servo) = &mut self.parameters.servo {
             servo.set_zero(zero);
         }
     }
 
     /// Whether there are parameters to decode with.
     pub const fn decodes(&self) -> bool {
-        self.parameters.servo().is_some()
+        self.parameters.servo.is_some()
     }
 
     /// State and reason after the last tick.
@@ -148,7 +136,7 @@ impl<'d> Node<'d> {
         self.ticks
     }
 
-    /// Ticks in which the FPU's settings had been changed by something else.
+    /// Ticks with changed settings of the FPU.
     pub const fn fpu_restored(&self) -> u32 {
         self.fpu_restored
     }
@@ -168,15 +156,14 @@ impl<'d> Node<'d> {
         &mut self,
         sample: Result<RawFrame, SampleFault>,
         facts: &Facts,
-        fpu: &mut impl FpuSettings,
         outbox: &mut Outbox,
     ) -> Reading {
-        let servo = self.parameters.servo_mut();
+        let servo = self.parameters.servo.as_mut();
         let without_pin = (!self.has_key).then_some(false);
         (self.service).before_tick(servo, facts.servo_off_pin.or(without_pin));
-        let reading = self.decode(&sample, fpu);
+        let reading = self.decode(&sample);
         let is_updating = self.receiver.is_updating();
-        self.state = state_of(&self.parameters, is_updating, &sample, &reading);
+        self.state = self.parameters.state(is_updating, &sample, &reading);
         self.board_checks = facts.board.board_checks;
         if self.decodes() {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
@@ -190,13 +177,12 @@ impl<'d> Node<'d> {
                 self.send_codes(frame, outbox);
             }
         }
-        let servo = self.parameters.servo_mut();
-        let answer = self.service.tick(servo.as_deref());
+        let answer = self.service.tick(self.parameters.servo.as_ref());
         let was_off = core::mem::replace(&mut self.bus_off_sent, facts.bus_off) != facts.bus_off;
         self.receiver.tick(self.service.servo_is_off());
         let due = match self.ticks % u32::from(SLOW_TICKS) {
             0 => Some(Content::Status(self.status(facts))),
-            // A receiver must know why frames stay away.
+            // A receiver must know why no frames come.
             _ if was_off || self.is_storing() => Some(Content::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
@@ -212,8 +198,7 @@ impl<'d> Node<'d> {
         reading
     }
 
-    /// Takes a frame that came over the bus, and answers if it is a command. `nonce` is a fresh
-    /// random number, if there is a source of any.
+    /// Takes a frame from the bus, and answers a command. `nonce` is a fresh random number, if there is one.
     pub fn take<F: Frame>(
         &mut self,
         frame: &F,
@@ -221,7 +206,7 @@ impl<'d> Node<'d> {
         store: &mut dyn Store,
         nonce: Option<Nonce>,
     ) {
-        let servo = self.parameters.servo_mut();
+        let servo = self.parameters.servo.as_mut();
         let updates = Updates {
             receiver: &mut self.receiver,
             store,
@@ -234,8 +219,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Whether [`Node::store`] is to be called at the end of a tick before which nothing was left to
-    /// be sent.
+    /// Whether [`Node::store`] is to be called at the end of a tick, once all frames have left.
     pub const fn is_storing(&self) -> bool {
         self.receiver.is_storing()
     }
@@ -260,7 +244,7 @@ impl<'d> Node<'d> {
         frames.for_each(|frame| outbox.push(frame));
     }
 
-    /// After the pose: whoever controls by it does not wait for the record.
+    /// Comes after the pose: control does not wait for the record.
     fn send_codes(&self, frame: &RawFrame, outbox: &mut Outbox) {
         let mut frames = sensor::frames(self.layout, frame).peekable();
         if let Some(time) = frames.next_if(|frame| frame.message == Message::SensorTime) {
@@ -273,21 +257,17 @@ impl<'d> Node<'d> {
         }
     }
 
-    fn decode(
-        &mut self,
-        sample: &Result<RawFrame, SampleFault>,
-        fpu: &mut impl FpuSettings,
-    ) -> Reading {
-        let Some(servo) = self.parameters.servo_mut() else {
+    fn decode(&mut self, sample: &Result<RawFrame, SampleFault>) -> Reading {
+        let Some(servo) = &mut self.parameters.servo else {
             return NOTHING;
         };
-        let changed_before = fpu.restore();
+        let changed_before = fpu::restore();
         let reading = run(servo, sample);
-        let changed_meanwhile = fpu.restore();
+        let changed_meanwhile = fpu::restore();
         if changed_before || changed_meanwhile {
             self.fpu_restored = self.fpu_restored.saturating_add(1);
         }
-        // Whatever was computed under other settings is not what the host would compute.
+        // Other settings give other words than the host's.
         if changed_meanwhile || self.receiver.is_updating() {
             NOTHING
         } else {
@@ -305,7 +285,7 @@ impl<'d> Node<'d> {
             flags: on(flag::WATCHDOG_RESET, self.watchdog_reset)
                 | on(flag::BUS_WAS_OFF, facts.bus_off > 0)
                 | on(flag::INTERNAL_OSCILLATOR, by_internal)
-                | self.service.flags(self.parameters.servo()),
+                | self.service.flags(self.parameters.servo.as_ref()),
             missed_ticks: u16::try_from(facts.missed_ticks).unwrap_or(u16::MAX),
             bus_off: u8::try_from(facts.bus_off).unwrap_or(u8::MAX),
             version: PROTOCOL_VERSION,
@@ -313,7 +293,7 @@ impl<'d> Node<'d> {
     }
 
     fn health(&self) -> Health {
-        match self.parameters.servo() {
+        match &self.parameters.servo {
             Some(servo) => servo.health(),
             None => Health {
                 ticks: self.ticks,

@@ -1,164 +1,85 @@
+//! When the servo counts as off: by the line, and by the key.
+
 extern crate std;
 
 use super::*;
 use crate::records::{Choice, Loaded, Records};
 use crate::store::flash_model::FlashModel;
+use crate::store::tests::blob;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
-use runtime::calibration::{Calibration, Origin};
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{ModelKind, Probes, Sensitivity};
-use runtime::parameters::Text;
-use runtime::{OnInvalid, PoseTracker};
+use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest, tag};
 use std::boxed::Box;
 use std::vec::Vec;
 
-#[path = "node_key_tests.rs"]
-mod key;
-
-/// An FPU whose settings something else changes: before these calls, counted from 0.
-#[derive(Default)]
-struct Disturbed {
-    calls: usize,
-    at: Vec<usize>,
-}
-
-impl FpuSettings for Disturbed {
-    fn restore(&mut self) -> bool {
-        self.calls += 1;
-        self.at.contains(&(self.calls - 1))
-    }
-}
-
-const WINDOW: CodeWindow = CodeWindow {
-    low: -32767,
-    high: 32766,
-};
-
-/// A blob of this stage.
-fn blob(serial: &str) -> Vec<u8> {
-    let calibration = Calibration {
-        model: ModelKind::M31,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.19, -0.21, -0.34],
-            misalignment_rad: [0.01, -0.02, 0.03],
-        },
-        probes: Probes::Linear(
-            [Sensitivity {
-                eta: 0.8,
-                per_z_m: -190.0,
-                per_rx_rad: -70.0,
-                per_ry_rad: 15.0,
-            }; 3],
-        ),
-        hall_m_per_code: 6.25e-8,
-        hall_window: WINDOW,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: WINDOW,
-        calibrated_planar: [1e-3; 3],
-        calibrated_vertical: [5e-4; 3],
-        sensitivity_min: 0.1,
-        temperature: runtime::temperature::Temperature::NONE,
-    };
-    let origin = Origin {
-        serial: Text::try_from(serial).expect("short"),
-        ..Origin::default()
-    };
-    let set = calibration.prepare(&origin).expect("a sound calibration");
-    let mut buffer = [0; runtime::blob::MAX_BYTES];
-    set.to_bytes(&mut buffer).expect("it fits").to_vec()
-}
+/// The random number of every challenge.
+const NONCE: Nonce = [1, 2, 3, 4];
 
 fn loaded() -> &'static Loaded {
     let mut flash = FlashModel::erased();
-    flash.load(0, &blob("stage-7"));
-    let (mut records, _) = Records::start(&mut flash, Choice::Newest, None);
+    flash.load(0, &blob(0));
+    let (mut records, _) = Records::start(flash, Choice::Newest, None);
     let place = Box::leak(Box::new(core::mem::MaybeUninit::uninit()));
     records.load(Choice::Newest, place).expect("a sound slot")
 }
 
-fn node() -> Node<'static> {
-    let loaded = loaded();
-    let parameters = Parameters::Usable {
-        servo: PoseTracker::new(&loaded.decoder, OnInvalid::Zero),
-        other_slot: None,
-    };
-    Node::new(parameters, false, Layout::Bits24, IDENTITY)
-}
-
-const IDENTITY: Identity<'_> = Identity {
-    serial: None,
-    key: None,
-    program_version: 1,
-};
-
-/// What is drawn for a tag.
-const NONCE: Nonce = [1, 2, 3, 4];
-
-fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
+/// Sends a frame. Returns the outcomes that the node answers.
+fn send(node: &mut Node<'_>, content: Content) -> Vec<Outcome> {
+    let coded = Mailbox::default().send(&content).expect("a frame");
+    let mut outbox = Outbox::new();
     let (mut records, _) = Records::start(FlashModel::erased(), Choice::Newest, None);
-    node.take(frame, outbox, &mut records, Some(NONCE));
+    let frame = BusFrame::from(coded);
+    node.take(&frame, &mut outbox, &mut records, Some(NONCE));
+    let mut host = Mailbox::default();
+    core::iter::from_fn(|| outbox.pop())
+        .filter_map(|coded| match host.take(&BusFrame::from(coded))?.ok()? {
+            Content::Answer(answer) => answer.outcome,
+            _ => None,
+        })
+        .collect()
 }
 
-fn frame(sequence: u32) -> RawFrame {
-    RawFrame::new([100, 200, 300], [10, 20, 30], sequence, sequence * 2000)
+/// Sends a request, with the tag by this key if there is one.
+fn ask(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>) -> Vec<Outcome> {
+    let command = Command::new(request, token);
+    if let Some(key) = key {
+        let challenge = Request::Update(UpdateRequest::Challenge { part: 0 });
+        send(node, Content::Command(Command::new(challenge, token)));
+        let tag = tag(&key, &NONCE, &command, &[]);
+        for (index, word) in (TAG_INDEX..).zip(tag.as_chunks().0) {
+            let word = u32::from_le_bytes(*word);
+            send(node, Content::UpdateData(UpdateData { token, index, word }));
+        }
+    }
+    send(node, Content::Command(command))
 }
 
-/// Frames that one tick sends.
-fn tick(
-    node: &mut Node<'_>,
-    sample: Result<RawFrame, SampleFault>,
-) -> Vec<hal_adapters::can::Coded> {
-    let mut outbox = Outbox::new();
-    let facts = Facts {
-        servo_off_pin: Some(true),
-        ..Facts::default()
-    };
-    node.tick(sample, &facts, &mut Disturbed::default(), &mut outbox);
-    core::iter::from_fn(|| outbox.pop()).collect()
-}
-
-fn contents(frames: &[hal_adapters::can::Coded]) -> Vec<Content> {
-    let mut mailbox = Mailbox::default();
-    let read = |coded: &hal_adapters::can::Coded| mailbox.take(&BusFrame::from(*coded))?.ok();
-    frames.iter().filter_map(read).collect()
-}
-
-fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Content> {
-    let coded = Mailbox::default().send(&Content::Command(Command::new(request, token)));
-    let mut outbox = Outbox::new();
-    take(
-        node,
-        &BusFrame::from(coded.expect("a command")),
-        &mut outbox,
-    );
-    contents(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
-}
-
+/// The line must say off. Without a line the key must stand in for it; without both nothing moves the pose.
 #[test]
-fn a_program_built_to_record_does_so_from_the_first_tick() {
-    let mut node = node().recording(true);
-    let frames = tick(&mut node, Ok(frame(0)));
-    let messages: Vec<_> = frames.iter().map(|coded| coded.message).collect();
-    use Message as M;
-    let want = [
-        [M::PoseX, M::PoseY, M::PoseRz].as_slice(),
-        &[M::PoseTime, M::PoseZ, M::SensorTime],
-        &[M::HallAb24, M::HallCCapacitive1At24, M::Capacitive23At24],
-        &[M::NodeStatus],
-    ];
-    assert_eq!(messages, want.concat());
-}
-
-#[test]
-fn a_remote_frame_or_a_foreign_one_is_no_command() {
-    let mut node = node();
-    let mut outbox = Outbox::new();
-    let remote = BusFrame::new_remote(Message::Command.id(), 8).expect("eight bytes");
-    take(&mut node, &remote, &mut outbox);
-    let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
-    take(&mut node, &foreign, &mut outbox);
-    assert_eq!(outbox.front(true), None);
+fn the_servo_counts_as_on_unless_the_line_says_off_or_a_key_stands_in_for_it() {
+    let key = Some([7; 16]);
+    for (line, key, outcome) in [
+        (Some(true), None, Outcome::Done),
+        (Some(true), key, Outcome::Done),
+        (Some(false), key, Outcome::ServoOn),
+        (None, key, Outcome::Done),
+        (None, None, Outcome::ServoOn),
+    ] {
+        let parameters = Parameters::at_start(Some(loaded()), None, None, true);
+        let identity = Identity {
+            serial: None,
+            key,
+            program_version: 1,
+        };
+        let mut node = Node::new(parameters, false, Layout::Bits24, identity);
+        let facts = Facts {
+            servo_off_pin: line,
+            ..Facts::default()
+        };
+        let frame = RawFrame::new([100, 200, 300], [10, 20, 30], 0, 0);
+        node.tick(Ok(frame), &facts, &mut Outbox::new());
+        ask(&mut node, Request::ServoOff { seconds: 9 }, 1, key);
+        let answered = ask(&mut node, Request::ClearZero, 2, key);
+        assert_eq!(answered, [outcome], "{line:?} {key:?}");
+    }
 }

@@ -1,5 +1,4 @@
-//! The parameters that the controller keeps in flash: which it runs, what it reports of the others, and
-//! new ones that come over the bus.
+//! The parameters in flash: the running blob, the reason why another is refused, and new blobs from the bus.
 
 use crate::store::{self, Contents, Flash, Image, SLOTS, Stored};
 use core::mem::MaybeUninit;
@@ -11,33 +10,15 @@ use runtime::{AnyDecoder, ParameterSet};
 /// Which blob a start runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// The newest: after power-on, and once it was activated.
+    /// The newest blob: after power-on and after an activation.
     Newest,
-    /// The one with this CRC, which ran before the reset.
+    /// The blob with this CRC, which ran before the reset.
     Blob(u32),
-    /// None, and none is looked into.
+    /// No blob. The blobs are not checked.
     Nothing,
 }
 
-/// Why a slot is not used, in one byte for the status frame: the number of the slot in bits 4 to 6
-/// and [`BlobError::number`] below.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// The byte.
-    pub reason: u8,
-}
-
-impl Refusal {
-    /// Both slots are empty.
-    pub const NEITHER: Self = Self { reason: 2 };
-
-    fn of(slot: u8, error: &BlobError) -> Self {
-        let reason = slot << 4 | error.number();
-        Self { reason }
-    }
-}
-
-/// What a sound blob gives.
+/// The content of a sound blob.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The decoder.
@@ -60,9 +41,10 @@ pub struct Records<F> {
 }
 
 impl<F: Flash> Records<F> {
-    /// At start-up: settles what was interrupted and looks at both slots. Blobs of another stage than
-    /// `serial` are refused. Gives what is wrong with a slot, slot 0 first.
-    pub fn start(mut flash: F, choice: Choice, serial: Option<&str>) -> (Self, Option<Refusal>) {
+    /// At start-up: settles interrupted operations and checks both slots. A blob of another stage than `serial` is
+    /// refused. Also returns the reason of the first refused slot: its number in bits 4 to 6 and
+    /// [`BlobError::number`] below.
+    pub fn start(mut flash: F, choice: Choice, serial: Option<&str>) -> (Self, Option<u8>) {
         store::settle(&mut flash);
         let mut records = Self {
             flash,
@@ -77,14 +59,14 @@ impl<F: Flash> Records<F> {
                 *to = looked.unwrap_or_default();
             }
             if let Err(error) = looked {
-                refusal.get_or_insert(Refusal::of(slot, &error));
+                refusal.get_or_insert(slot << 4 | error.number());
             }
         }
         (records, refusal)
     }
 
-    /// The blob of a slot, if it is sound. A parameter set has 700 bytes: in a function of its own, it
-    /// leaves the stack at once.
+    /// The blob of a slot, if it is sound. In a function of its own, because a parameter set takes 700 bytes of
+    /// stack.
     #[inline(never)]
     fn look(
         &mut self,
@@ -92,10 +74,7 @@ impl<F: Flash> Records<F> {
         choice: Choice,
         serial: Option<&str>,
     ) -> Result<Option<Stored>, BlobError> {
-        let read = Image::read(&mut self.flash, slot);
-        let Ok(image) = read.as_ref() else {
-            return Ok(None);
-        };
+        let image = Image::read(&self.flash, slot);
         match image.contents() {
             Contents::Nothing => return Ok(None),
             Contents::Damaged => {
@@ -118,7 +97,7 @@ impl<F: Flash> Records<F> {
         }
     }
 
-    /// Reads the blob that is to run, which runs from now on. `None` if it is not there.
+    /// Loads the chosen blob, which runs from now on. `None` if it is not there.
     #[inline(never)]
     pub fn load(
         &mut self,
@@ -130,7 +109,7 @@ impl<F: Flash> Records<F> {
             Choice::Blob(crc) => self.latest(|stored| stored.crc == crc),
             Choice::Nothing => None,
         }?;
-        let image = Image::read(&mut self.flash, stored.slot).ok()?;
+        let image = Image::read(&self.flash, stored.slot);
         let read = ParameterSet::from_flash(image.blob());
         let set = read.as_ref().ok()?;
         let loaded: &'static Loaded = place.write(Loaded {
@@ -142,18 +121,18 @@ impl<F: Flash> Records<F> {
         Some(loaded)
     }
 
-    /// Of the blobs that are meant the one with the highest sequence number; of two equal ones that in slot 0.
-    fn latest(&self, is_meant: impl Fn(&Stored) -> bool) -> Option<Stored> {
+    /// The selected blob with the highest sequence number; slot 0 comes first among equal numbers.
+    fn latest(&self, select: impl Fn(&Stored) -> bool) -> Option<Stored> {
         let stored = self.stored.iter().rev().flatten().copied();
-        stored.filter(is_meant).max_by_key(|stored| stored.sequence)
+        stored.filter(select).max_by_key(|stored| stored.sequence)
     }
 
-    /// The flash as it is now.
+    /// The flash.
     pub const fn flash(&self) -> &F {
         &self.flash
     }
 
-    /// The slot that may be erased: not that of the blob that runs, nor, where none runs, of the newest.
+    /// The slot that may be erased: the running blob stays, or the newest blob if none runs.
     fn spare(&self) -> u8 {
         let running = self.running.map(|(stored, _)| stored);
         let kept = running.or_else(|| self.latest(|_| true));
@@ -161,7 +140,7 @@ impl<F: Flash> Records<F> {
     }
 }
 
-/// Whether a blob, with what follows it or without, is sound and that of the stage.
+/// Checks that a blob, with or without padding, is sound and belongs to the stage.
 fn check(memory: &[u8], serial: Option<&str>) -> Result<(), BlobError> {
     let read = ParameterSet::from_flash(memory);
     let set = read.as_ref().map_err(|error| *error)?;
@@ -185,8 +164,8 @@ impl<F: Flash> Store for Records<F> {
 
     fn word(&mut self, index: usize) -> Option<u32> {
         let (stored, loaded) = self.running?;
-        let image = Image::read(&mut self.flash, stored.slot).ok()?;
-        // An update may have written another one into its slot.
+        let image = Image::read(&self.flash, stored.slot);
+        // An update may have written another blob into its slot.
         let is_there = image.stored(stored.slot)?.crc == loaded.crc;
         let blob = image.blob().get(..(stored.bytes as usize).min(MAX_BYTES))?;
         word_at(blob, index).filter(|_| is_there)
@@ -203,17 +182,13 @@ impl<F: Flash> Store for Records<F> {
     fn write(&mut self, sequence: u32, blob: &[u8]) -> Result<(), NotWritten> {
         let slot = self.spare();
         let written = store::write(&mut self.flash, slot, sequence, blob);
-        // What a failure has left there is what was there before, or nothing.
-        let left = Image::read(&mut self.flash, slot).ok();
+        // After a failure the slot has the blob before it, or none.
+        let left = Image::read(&self.flash, slot).stored(slot);
         if let Some(to) = self.stored.get_mut(usize::from(slot)) {
-            *to =
-                to.filter(|before| left.and_then(|left| left.stored(before.slot)) == Some(*before));
-            *to = written.ok().or(*to);
+            *to = written.ok().or(to.filter(|before| left == Some(*before)));
         }
-        if let Ok(stored) = written {
-            self.highest = stored.sequence;
-        }
-        written.map(|_| ()).map_err(NotWritten::from)
+        self.highest = written?.sequence;
+        Ok(())
     }
 }
 

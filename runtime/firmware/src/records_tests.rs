@@ -2,7 +2,7 @@ extern crate std;
 
 use super::*;
 use crate::store::flash_model::FlashModel;
-use crate::store::tests::{SERIAL, blob, crc, start, update};
+use crate::store::tests::{SERIAL, blob, crc, update};
 use std::boxed::Box;
 
 fn runs(flash: &mut FlashModel, choice: Choice) -> Option<u32> {

@@ -269,14 +269,6 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_noted_with_its_kind_and_step() {
-        let record = record();
-        assert_eq!(record.fault.kind_and_step, 0x0502);
-        assert_eq!((record.fault.address, record.faults), (0x0800_c124, 4));
-        assert!(record.crashed);
-    }
-
-    #[test]
     fn the_crystal_is_blamed_for_its_own_faults_only() {
         let of = |kind, step| Fault::new(kind, step, 0, 0).is_of_the_crystal();
         assert!(of(FaultKind::Watchdog, Step::Clocks));

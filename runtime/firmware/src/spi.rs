@@ -7,7 +7,7 @@ use embedded_hal::spi::{ErrorKind, ErrorType, SpiBus};
 use stm32f4xx_hal::pac::{DMA2, SPI1};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Streams that serve SPI1, and the channel on which they do (table 43).
+/// Streams that serve SPI1, and their channel (table 43).
 const RECEIVE: usize = 0;
 const SEND: usize = 3;
 const CHANNEL: u32 = 3 << 25;
@@ -26,7 +26,10 @@ const ALL_FLAGS: u32 = 0b11_1101 | 0b11_1101 << 22;
 /// transfer of 30 bytes takes 23 us.
 const LOOKS: u32 = CORE_HZ / 4 / 2000;
 
-/// The bus, whose buffers must not lie in CCM RAM (section 2.3.1): DMA does not reach it.
+/// Bytes of a write at a time.
+const CHUNK: usize = 32;
+
+/// The bus. Its buffers must not lie in CCM RAM (section 2.3.1): DMA does not reach it.
 pub struct SpiDma {
     spi: SPI1,
     dma: DMA2,
@@ -39,39 +42,30 @@ impl SpiDma {
         Self { spi, dma }
     }
 
-    /// Sends and receives `count` bytes. Each side is so many bytes, or, if it does not move, one that
-    /// stands for all. Both may be the same: a byte is sent before one is received in its place.
-    fn exchange(
-        &mut self,
-        (from, from_moves): (*const u8, u32),
-        (into, into_moves): (*mut u8, u32),
-        count: usize,
-    ) -> Result<(), ErrorKind> {
-        if count == 0 {
+    /// Sends each byte and receives a byte in its place.
+    fn exchange(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
+        if words.is_empty() {
             return Ok(());
         }
-        let count = u16::try_from(count).map_err(|_| ErrorKind::Other)?;
+        let count = u16::try_from(words.len()).map_err(|_| ErrorKind::Other)?;
+        let address = words.as_mut_ptr() as u32;
         let (spi, dma) = (&self.spi, &self.dma);
-        // What an earlier transfer may have left, if it was given up.
+        // A byte of an earlier transfer that was given up.
         let _ = spi.dr().read();
         spi.cr2().modify(|_, w| w.rxdmaen().set_bit());
         // SAFETY: bits that are cleared by writing 1.
         dma.lifcr().write(|w| unsafe { w.bits(ALL_FLAGS) });
-        let (received, sent) = (into as u32, from as u32);
-        for (stream, address, settings) in [
-            (RECEIVE, received, into_moves),
-            (SEND, sent, from_moves | TO_PERIPHERAL),
-        ] {
+        for (stream, direction) in [(RECEIVE, 0), (SEND, TO_PERIPHERAL)] {
             let registers = dma.st(stream);
-            let settings = CHANNEL | FIRST | settings;
-            // SAFETY: the data register of SPI1, and memory of `count` bytes that the caller lends
-            // until this returns: no stream is on any more then.
+            let settings = CHANNEL | FIRST | NEXT_ADDRESS | direction;
+            // SAFETY: the data register of SPI1, and memory that the caller lends until this returns: no
+            // stream is on any more then.
             unsafe {
                 registers.ndtr().write(|w| w.ndt().set(count));
                 registers.par().write(|w| w.bits(spi.dr().as_ptr() as u32));
                 registers.m0ar().write(|w| w.bits(address));
                 registers.cr().write(|w| w.bits(settings));
-                // What is sent must be in memory before.
+                // The bytes to be sent must be in memory before.
                 asm::dmb();
                 registers.cr().write(|w| w.bits(settings | ENABLE));
             }
@@ -86,7 +80,7 @@ impl SpiDma {
         }
         spi.cr2()
             .modify(|_, w| w.rxdmaen().clear_bit().txdmaen().clear_bit());
-        // What was received is read afterwards.
+        // The received bytes are read afterwards.
         asm::dmb();
         if flags & (RECEIVED | ERRORS) == RECEIVED {
             return Ok(());
@@ -103,34 +97,34 @@ impl ErrorType for SpiDma {
 
 impl SpiBus for SpiDma {
     fn read(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-        let into = (words.as_mut_ptr(), NEXT_ADDRESS);
-        let zero = 0;
-        self.exchange((&raw const zero, 0), into, words.len())
+        words.fill(0);
+        self.exchange(words)
     }
 
     fn write(&mut self, words: &[u8]) -> Result<(), ErrorKind> {
-        let from = (words.as_ptr(), NEXT_ADDRESS);
-        let mut nowhere = 0;
-        self.exchange(from, (&raw mut nowhere, 0), words.len())
+        for words in words.chunks(CHUNK) {
+            let mut buffer = [0; CHUNK];
+            let buffer = buffer.get_mut(..words.len()).unwrap_or_default();
+            buffer.copy_from_slice(words);
+            self.exchange(buffer)?;
+        }
+        Ok(())
     }
 
     fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), ErrorKind> {
-        let both = read.len().min(write.len());
-        let (both_ways, read) = read.split_at_mut(both);
-        let (sent, write) = write.split_at(both);
-        both_ways.copy_from_slice(sent);
-        self.transfer_in_place(both_ways)?;
-        self.read(read)?;
-        self.write(write)
+        let (both, rest) = read.split_at_mut(read.len().min(write.len()));
+        let (sent, unanswered) = write.split_at(both.len());
+        both.copy_from_slice(sent);
+        self.exchange(both)?;
+        self.read(rest)?;
+        self.write(unanswered)
     }
 
     fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-        let into = words.as_mut_ptr();
-        let from = (into.cast_const(), NEXT_ADDRESS);
-        self.exchange(from, (into, NEXT_ADDRESS), words.len())
+        self.exchange(words)
     }
 
-    /// Nothing is left to send when a transfer has ended.
+    /// A transfer ends with its last byte.
     fn flush(&mut self) -> Result<(), ErrorKind> {
         Ok(())
     }

@@ -9,7 +9,6 @@ use crate::wait::Stopwatch;
 use firmware::retained::Step;
 use firmware::start_up::{Before, Cause};
 use hal_adapters::can::status::{BoardFacts, bit, board_check};
-use runtime::PlanarPose;
 use stm32f4xx_hal::pac::RCC;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -21,7 +20,7 @@ const CRYSTAL_US: u32 = 8000;
 /// The brown-out level in FLASH_OPTCR: 0 is the highest, 2.7 V.
 const BROWN_OUT_LEVEL: u32 = 0b11 << 2;
 
-/// Reads and clears the cause of the reset; what was before it.
+/// Reads and clears the cause of the reset, and evaluates the record of the run before it.
 pub fn before(rcc: &RCC) -> Before {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
@@ -32,13 +31,13 @@ pub fn before(rcc: &RCC) -> Before {
     } else {
         Cause::Reset
     };
-    let before = Before::of(cause, fault::retained());
+    let before = Before::new(cause, fault::retained());
     fault::retain(&before.record);
     before
 }
 
-/// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not
-/// start, the PLL did not lock to it, or it stopped. Says whether it is the crystal.
+/// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not start, the PLL did not lock
+/// to it, or it stopped. Returns whether the crystal runs.
 pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, bool) {
     let failed = before.by_fault && before.record.fault.is_of_the_crystal();
     fault::begin(Step::Clocks);
@@ -59,8 +58,8 @@ pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, boo
     (rcc, crystal)
 }
 
-/// What the health frames report of the board and the last fault; `checks` are the bits of
-/// [`board_check`] that are known besides those of `option_bytes`, the word FLASH_OPTCR.
+/// Board and last fault for the health frames. `checks` are bits of [`board_check`]; the brown-out level of
+/// `option_bytes`, the word FLASH_OPTCR, is added.
 pub const fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFacts {
     let low = bit(
         board_check::BROWN_OUT_LOW,
@@ -73,29 +72,5 @@ pub const fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> Boa
         faults: before.record.faults,
         option_bytes,
         board_checks: checks | low,
-    }
-}
-
-/// Keeps the zero deviation where a reset leaves it alone.
-pub struct ZeroKeeper {
-    zero: PlanarPose<f32>,
-}
-
-impl ZeroKeeper {
-    /// Keeps zero deviations of the blob of this CRC, which runs; without one, what was kept stays
-    /// for a later start.
-    pub fn new(blob: Option<u32>, zero: PlanarPose<f32>) -> Self {
-        if let Some(crc) = blob {
-            fault::update(|record| record.runs(crc, zero));
-        }
-        Self { zero }
-    }
-
-    /// Keeps `zero`, if it is another.
-    pub fn keep(&mut self, zero: PlanarPose<f32>) {
-        if self.zero != zero {
-            self.zero = zero;
-            fault::update(|record| record.zero = zero);
-        }
     }
 }

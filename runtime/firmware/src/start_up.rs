@@ -1,17 +1,17 @@
-//! The start-up, apart from the chip: what is known of the run that a reset ended, and what follows.
+//! The start-up, apart from the chip: the run before the reset decides which parameters run.
 
 use crate::node::Node;
 use crate::records::Choice;
 use crate::retained::{FaultKind, Retained};
 use crate::schedule::TICKS_PER_S;
 
-/// A program that ran for so many ticks, 1 s, does not fault at its start.
+/// A program that runs for 1 s has started well.
 pub const PROVEN_TICKS: u32 = TICKS_PER_S;
 
 /// The cause of this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The power came back: what is in RAM means nothing.
+    /// The power came back: RAM holds noise.
     PowerOn,
     /// The watchdog was not fed.
     Watchdog,
@@ -19,37 +19,35 @@ pub enum Cause {
     Reset,
 }
 
-/// Why the controller runs no parameters until a command starts it, or the power comes back: in the status
-/// frame the reason of its state.
+/// Why the controller runs no parameters until an activation or power-on: the reason of its state in the status
+/// frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stop {
     /// The program faulted twice in its first second.
     FaultedTwice = 1,
-    /// What ran before the reset is not known: the record in RAM is damaged.
+    /// The record in RAM is damaged.
     NotKnown = 2,
-    /// What ran before the reset is no longer in flash.
+    /// The blob that ran before the reset is no longer in flash.
     Gone = 3,
 }
 
-/// What was before this start.
+/// The state before this start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Before {
-    /// The cause of this start.
-    pub cause: Cause,
     /// Whether the watchdog or the program itself caused it, on a fault.
     pub by_fault: bool,
-    /// Whether no parameters run.
+    /// Why no parameters run.
     pub stop: Option<Stop>,
-    /// The parameters that run. A reset alone never changes them under a servo.
+    /// The blob that runs. A reset alone never changes it under a servo.
     pub choice: Choice,
-    /// The record that survived; after power-on an empty one. It is to be retained again.
+    /// The record that survived, to be retained again; empty after power-on.
     pub record: Retained,
 }
 
 impl Before {
-    /// What the record in RAM says, `None` if its check is wrong.
-    pub fn of(cause: Cause, kept: Option<Retained>) -> Self {
+    /// Evaluates the record in RAM, `None` if its check is wrong.
+    pub fn new(cause: Cause, kept: Option<Retained>) -> Self {
         let mut record = match cause {
             Cause::PowerOn => Retained::default(),
             Cause::Watchdog | Cause::Reset => kept.unwrap_or_else(Retained::damaged),
@@ -71,7 +69,6 @@ impl Before {
             crc => Choice::Blob(crc),
         };
         Self {
-            cause,
             by_fault,
             stop,
             choice,
@@ -79,14 +76,14 @@ impl Before {
         }
     }
 
-    /// Why nothing runs, once it is known whether the parameters were loaded.
+    /// Why nothing runs, after the attempt to load the parameters.
     pub fn stop(&self, is_loaded: bool) -> Option<Stop> {
         let is_gone = !is_loaded && matches!(self.choice, Choice::Blob(_));
         self.stop.or(is_gone.then_some(Stop::Gone))
     }
 
-    /// Restores the zero deviation if it was measured with the blob of this CRC. Says whether one
-    /// may have been lost.
+    /// Restores the zero deviation if it belongs to the blob of this CRC. Returns whether a zero deviation may have been
+    /// lost.
     pub fn restore_zero(&self, node: &mut Node<'_>, blob: u32) -> bool {
         if self.record.running == blob {
             node.restore_zero(self.record.zero);
@@ -115,7 +112,7 @@ mod tests {
     #[test]
     fn ram_is_not_believed_after_power_on() {
         let kept = run(7, Some(FaultKind::HardFault));
-        let before = Before::of(Cause::PowerOn, Some(kept));
+        let before = Before::new(Cause::PowerOn, Some(kept));
         assert_eq!(before.record, Retained::default());
         assert_eq!((before.by_fault, before.choice), (false, Choice::Newest));
         assert_eq!(before.stop(false), None);
@@ -123,11 +120,11 @@ mod tests {
 
     #[test]
     fn a_fault_is_the_cause_of_one_start_only() {
-        let first = Before::of(Cause::Reset, Some(run(7, Some(FaultKind::Panic))));
-        let second = Before::of(Cause::Reset, Some(first.record));
+        let first = Before::new(Cause::Reset, Some(run(7, Some(FaultKind::Panic))));
+        let second = Before::new(Cause::Reset, Some(first.record));
         assert_eq!((first.by_fault, second.by_fault), (true, false));
         assert_eq!((first.record.faults, second.record.faults), (1, 1));
-        let bitten = Before::of(Cause::Watchdog, Some(run(7, None)));
+        let bitten = Before::new(Cause::Watchdog, Some(run(7, None)));
         assert_eq!((bitten.by_fault, bitten.record.faults), (true, 1));
     }
 
@@ -136,21 +133,21 @@ mod tests {
         for (cause, kept, choice, stop) in [
             (Cause::Reset, Some(run(7, None)), Choice::Blob(7), None),
             (Cause::Watchdog, Some(run(7, None)), Choice::Blob(7), None),
-            // Nothing ran since power-on.
+            // No blob ran since power-on.
             (Cause::Reset, Some(run(0, None)), Choice::Newest, None),
             (Cause::Reset, None, Choice::Nothing, Some(Stop::NotKnown)),
         ] {
-            let before = Before::of(cause, kept);
+            let before = Before::new(cause, kept);
             assert_eq!((before.choice, before.stop(true)), (choice, stop));
             // And again at the next reset.
-            let before = Before::of(Cause::Reset, Some(before.record));
+            let before = Before::new(Cause::Reset, Some(before.record));
             assert_eq!((before.choice, before.stop(true)), (choice, stop));
         }
-        let gone = Before::of(Cause::Reset, Some(run(7, None)));
+        let gone = Before::new(Cause::Reset, Some(run(7, None)));
         assert_eq!(gone.stop(false), Some(Stop::Gone));
         for mut kept in [run(7, None), Retained::damaged()] {
             kept.activate();
-            let before = Before::of(Cause::Reset, Some(kept));
+            let before = Before::new(Cause::Reset, Some(kept));
             assert_eq!((before.choice, before.stop(true)), (Choice::Newest, None));
         }
     }
@@ -159,7 +156,7 @@ mod tests {
     fn two_faults_in_the_first_second_stop_the_program_until_it_is_acknowledged() {
         let start = |record: &mut Retained, kind| {
             record.note(kind, 0, 0);
-            let before = Before::of(Cause::Reset, Some(*record));
+            let before = Before::new(Cause::Reset, Some(*record));
             *record = before.record;
             before.stop
         };
@@ -172,10 +169,10 @@ mod tests {
         assert_eq!(start(&mut record, FaultKind::HardFault), stopped);
         // However long it then stands.
         record.prove();
-        let before = Before::of(Cause::Reset, Some(record));
+        let before = Before::new(Cause::Reset, Some(record));
         assert_eq!((before.stop, before.choice), (stopped, Choice::Nothing));
         record.activate();
-        let before = Before::of(Cause::Reset, Some(record));
+        let before = Before::new(Cause::Reset, Some(record));
         assert_eq!((before.stop, before.choice), (None, Choice::Newest));
         // A crystal that fails has its own remedy.
         let mut record = run(7, None);
@@ -187,7 +184,7 @@ mod tests {
 
     #[test]
     fn of_a_damaged_record_a_zero_may_have_been_lost() {
-        let before = Before::of(Cause::Reset, None);
+        let before = Before::new(Cause::Reset, None);
         assert!(before.record.zero.x_m.is_nan());
         assert!(!before.by_fault);
     }

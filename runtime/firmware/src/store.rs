@@ -1,51 +1,47 @@
-//! Two slots of flash, each with one blob of [`runtime::blob`]: one runs, the other takes the next.
+//! Two slots of flash with one blob of [`runtime::blob`] each: one runs, the other takes the next.
 //!
-//! Numbers are little-endian. A slot is a sector of 16 KiB; what is not mentioned is erased.
+//! Numbers are little-endian. A slot is a sector of 16 KiB; all other bytes are erased.
 //!
-//! | offset | bytes | what |
+//! | offset | bytes | content |
 //! |---|---|---|
 //! | 0 | 656 | the blob, filled up with 0xFF |
 //! | 656 | 4 | sequence number, 1 to 2^32 - 2 |
 //! | 660 | 4 | CRC-32C (Castagnoli) of the 660 bytes before it |
 //! | 664 | 4 | commit word `COMT`; 0: never to be committed |
-//! | 668 | 4 | `SEAL`: the word before was programmed to the end |
+//! | 668 | 4 | `SEAL`: the commit word was programmed to the end |
 //!
-//! A blob that a probe flashes has none of the four words, and the sequence number 0. The blob with
-//! the highest number is the newest; of two that a probe has flashed it is the one in slot 0.
+//! A blob that a probe flashes has none of the four words, and the sequence number 0. The blob with the highest
+//! number is the newest; a probe's blob in slot 0 comes before one in slot 1.
 //!
-//! # What survives a cut of the power
+//! # Cuts of the power
 //!
-//! What an interrupted operation leaves is not guaranteed (RM0090 rev. 21, section 3.6). A bit may
-//! even read right after one start and wrong after the next, until it is programmed or erased to the
-//! end; file systems on flash know such unstable bits (UBIFS). Therefore
-//! - the blob that runs is never erased, nor, where none runs, the one to be kept;
-//! - a slot is erased before each write, and dropped before that by a commit word of 0, so that no
-//!   word that an interrupted operation may have touched is used;
-//! - the sequence number is programmed before the blob: half an update never looks like a blob that
-//!   a probe has flashed;
-//! - the commit word follows once all is read back, and its seal after it. Where the seal is missing,
-//!   a start programs the commit word again if it reads right, else to 0, which nothing can undo
-//!   ([`settle`]).
+//! The content after an interrupted operation is not guaranteed (RM0090 rev. 21, section 3.6). A bit may even read
+//! right after one start and wrong after the next, until it is programmed or erased to the end (the unstable bits of
+//! UBIFS). Therefore:
+//! - The running blob is never erased. Without a running blob the newest blob is kept.
+//! - A slot is dropped by a commit word of 0 and then erased before each write. A word that an interrupted operation
+//!   may have touched is never used.
+//! - The sequence number is programmed before the blob: half an update never looks like a probe's blob.
+//! - The commit word follows once all is read back, and its seal after it. Without the seal, a start programs a
+//!   commit word again if it reads right, else to 0 for good ([`settle`]).
 //!
-//! So after a cut the newest blob is the one that is kept or the new one, and for certain the new one
-//! once [`write`] has ended; what waits for an activation gives way to what is stored after it. Going
-//! back is a write, too, of a copy of the blob before: if it is cut, the blob before may be lost.
+//! After a cut the newest blob is the kept blob or the new one, and certainly the new one once [`write`] has ended.
+//! A blob that waits for its activation gives way to the next one.
 
 use crc::{CRC_32_ISCSI, Crc};
-use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
 use hal_adapters::can::update::NotWritten;
 use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAGIC, MAX_BYTES};
 
 /// Bytes of a slot: sectors 1 and 2 of the STM32F405 (RM0090 rev. 21, table 5).
 pub const SLOT_BYTES: u32 = 16 * 1024;
-/// Slots there are.
+/// Number of slots.
 pub const SLOTS: usize = 2;
 
 const SEQUENCE: usize = MAX_BYTES;
 const CHECK: usize = SEQUENCE + 4;
 const COMMIT: usize = CHECK + 4;
 const SEAL: usize = COMMIT + 4;
-/// Bytes of a slot that are used.
+/// Used bytes of a slot.
 const USED: usize = SEAL + 4;
 
 const COMMITTED: [u8; 4] = *b"COMT";
@@ -60,54 +56,31 @@ type Lookup = crc::NoTable;
 #[cfg(not(target_os = "none"))]
 type Lookup = crc::Table<1>;
 
-/// The flash did not do what it was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FlashFault {
-    /// The supply was too low: before an operation, which was not done, or after it.
-    SupplyLow,
-    /// The flash reported an error or did not end in time.
-    Reported {
-        /// Its status register: FLASH_SR on the STM32F405.
-        status: u32,
-    },
-    /// Nothing was reported, and yet bytes read otherwise.
-    ReadsOtherwise {
-        /// The first of them, from the start of slot 0.
-        offset: u32,
-    },
-    /// The arguments do not fit the flash.
-    Argument(NorFlashErrorKind),
-}
+/// Both slots, one after the other; offsets count from the start of slot 0. A word may be programmed again as long as
+/// bits only fall (RM0090 rev. 21, section 3.6.4).
+pub trait Flash {
+    /// Reads bytes.
+    fn read(&self, offset: u32, bytes: &mut [u8]);
 
-impl NorFlashError for FlashFault {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::Argument(kind) => *kind,
-            _ => NorFlashErrorKind::Other,
-        }
-    }
-}
+    /// Programs a word.
+    ///
+    /// # Errors
+    /// [`NotWritten`]: the flash reported an error or did not end in time, or the supply was low before or after.
+    fn program(&mut self, offset: u32, word: [u8; 4]) -> Result<(), NotWritten>;
 
-impl From<FlashFault> for NotWritten {
-    fn from(fault: FlashFault) -> Self {
-        match fault {
-            FlashFault::SupplyLow => Self::SupplyLow,
-            _ => Self::Failed,
-        }
-    }
+    /// Erases a slot; it takes half a second.
+    ///
+    /// # Errors
+    /// As [`Flash::program`].
+    fn erase(&mut self, slot: u8) -> Result<(), NotWritten>;
 }
-
-/// Both slots, one after the other, in words that may be programmed again as long as bits only fall
-/// (RM0090 rev. 21, section 3.6.4).
-pub trait Flash: NorFlash<Error = FlashFault> {}
-impl<F: NorFlash<Error = FlashFault>> Flash for F {}
 
 /// A blob in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stored {
     /// Number of the slot.
     pub slot: u8,
-    /// Its sequence number; 0 of a blob that a probe has flashed.
+    /// Its sequence number; 0 for a blob that a probe has flashed.
     pub sequence: u32,
     /// Its own CRC-32C.
     pub crc: u32,
@@ -115,33 +88,30 @@ pub struct Stored {
     pub bytes: u32,
 }
 
-/// The bytes of a slot that are used.
+/// The used bytes of a slot.
 #[derive(Clone, Debug)]
 pub struct Image([u8; USED]);
 
-/// What a slot holds, by its four words.
+/// Content of a slot, by its four words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contents {
-    /// Nothing that counts.
+    /// No committed blob.
     Nothing,
-    /// What a probe has flashed, sound or not.
+    /// A blob that a probe has flashed, sound or not; or an erased slot.
     Plain,
-    /// What was committed under this number.
+    /// A blob that was committed under this number.
     Committed(u32),
-    /// What was committed, but is damaged.
+    /// A blob that was committed and is damaged now.
     Damaged,
 }
 
 impl Image {
     /// Reads a slot.
-    ///
-    /// # Errors
-    /// [`FlashFault`].
     #[inline(never)]
-    pub fn read(flash: &mut impl Flash, slot: u8) -> Result<Self, FlashFault> {
+    pub fn read(flash: &impl Flash, slot: u8) -> Self {
         let mut image = Self([0xff; USED]);
-        flash.read(at(slot, 0), &mut image.0)?;
-        Ok(image)
+        flash.read(at(slot, 0), &mut image.0);
+        image
     }
 
     /// The blob and its padding.
@@ -159,7 +129,7 @@ impl Image {
         CRC.checksum(body).to_le_bytes() == self.word(CHECK)
     }
 
-    /// What the slot holds.
+    /// Content of the slot.
     pub fn contents(&self) -> Contents {
         let words = self.0.get(SEQUENCE..).unwrap_or_default();
         if words.iter().all(|byte| *byte == 0xff) {
@@ -172,7 +142,7 @@ impl Image {
         }
     }
 
-    /// The blob by its own header, if there is one; its soundness is not looked at.
+    /// The blob by its own header, sound or not.
     pub fn stored(&self, slot: u8) -> Option<Stored> {
         let sequence = match self.contents() {
             Contents::Committed(sequence) => sequence,
@@ -203,34 +173,27 @@ fn program(
     slot: u8,
     offset: usize,
     word: [u8; 4],
-) -> Result<(), FlashFault> {
-    flash.write(at(slot, offset), &word)?;
+) -> Result<(), NotWritten> {
+    flash.program(at(slot, offset), word)?;
     expect(flash, slot, offset, word)
 }
 
-fn expect(
-    flash: &mut impl Flash,
-    slot: u8,
-    offset: usize,
-    word: [u8; 4],
-) -> Result<(), FlashFault> {
-    let (mut reads, offset) = ([0; 4], at(slot, offset));
-    flash.read(offset, &mut reads)?;
+fn expect(flash: &impl Flash, slot: u8, offset: usize, word: [u8; 4]) -> Result<(), NotWritten> {
+    let mut reads = [0; 4];
+    flash.read(at(slot, offset), &mut reads);
     if reads == word {
         Ok(())
     } else {
-        Err(FlashFault::ReadsOtherwise { offset })
+        Err(NotWritten::Failed)
     }
 }
 
-/// At power-on and after a reset, before anything is read: makes final whether a slot counts, where
-/// an interrupted operation may have left that undecided. A word that cannot be made final costs
-/// nothing: its slot is erased before it is used again.
+/// At power-on and after a reset, before anything is read: decides finally whether a slot counts, where an interrupted
+/// operation may have left that open. A word that cannot be programmed costs nothing: its slot is erased before it is
+/// used again.
 pub fn settle(flash: &mut impl Flash) {
     for slot in [0, 1] {
-        let Ok(image) = Image::read(flash, slot) else {
-            continue;
-        };
+        let image = Image::read(flash, slot);
         let commit = image.word(COMMIT);
         if image.contents() == Contents::Plain || image.word(SEAL) == SEALED || commit == VOID {
             continue;
@@ -246,25 +209,25 @@ pub fn settle(flash: &mut impl Flash) {
 /// Erases a slot and writes a blob there, under this sequence number; it takes half a second.
 ///
 /// # Errors
-/// [`FlashFault`]; the slot then does not count.
+/// [`NotWritten`]; the slot then does not count.
 pub fn write(
     flash: &mut impl Flash,
     slot: u8,
     sequence: u32,
     blob: &[u8],
-) -> Result<Stored, FlashFault> {
+) -> Result<Stored, NotWritten> {
     let mut image = Image([0xff; USED]);
-    let too_long = FlashFault::Argument(NorFlashErrorKind::OutOfBounds);
-    let body = image.0.get_mut(..blob.len().min(SEQUENCE + 1));
-    body.filter(|body| body.len() == blob.len())
-        .ok_or(too_long)?
-        .copy_from_slice(blob);
+    let body = image
+        .0
+        .get_mut(..SEQUENCE)
+        .and_then(|body| body.get_mut(..blob.len()));
+    body.ok_or(NotWritten::Failed)?.copy_from_slice(blob);
     put(&mut image, SEQUENCE, sequence.to_le_bytes());
     let check = CRC.checksum(image.0.get(..CHECK).unwrap_or_default());
     put(&mut image, CHECK, check.to_le_bytes());
 
     program(flash, slot, COMMIT, VOID)?;
-    flash.erase(at(slot, 0), at(slot, SLOT_BYTES as usize))?;
+    flash.erase(slot)?;
     (0..SLOT_BYTES as usize)
         .step_by(4)
         .try_for_each(|offset| expect(flash, slot, offset, BLANK))?;
@@ -278,14 +241,14 @@ pub fn write(
         .step_by(4)
         .try_for_each(|offset| expect(flash, slot, offset, image.word(offset)))?;
     if let Err(fault) = program(flash, slot, COMMIT, COMMITTED) {
-        // It must not count: what else could be done?
+        // It must not count.
         let _ = program(flash, slot, COMMIT, VOID);
         return Err(fault);
     }
     // The commit word was read back, and a start seals it.
     let _ = program(flash, slot, SEAL, SEALED);
     put(&mut image, COMMIT, COMMITTED);
-    image.stored(slot).ok_or(too_long)
+    image.stored(slot).ok_or(NotWritten::Failed)
 }
 
 fn put(image: &mut Image, offset: usize, word: [u8; 4]) {

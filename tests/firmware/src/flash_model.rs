@@ -3,7 +3,7 @@
 //! flash is busy the core stands, because the program lies in it.
 
 use ::tests::flash_model::{Cut, FlashModel as Sectors};
-use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+use firmware::store::Flash;
 use std::collections::VecDeque;
 
 /// Start of sector 1.
@@ -135,8 +135,8 @@ impl FlashModel {
     /// Reads so many bytes, lowest first.
     pub fn read(&mut self, offset: usize, bytes: usize) -> u64 {
         let mut read = [0; 8];
-        let done = self.sectors.read(offset as u32, &mut read[..bytes]);
-        done.map_or(0, |()| u64::from_le_bytes(read))
+        self.sectors.read(offset as u32, &mut read[..bytes]);
+        u64::from_le_bytes(read)
     }
 
     /// A write of the core to a sector.
@@ -144,7 +144,7 @@ impl FlashModel {
         self.status |= match self.control & (LOCK | PG | 0b11 << 8) {
             state if state & PG == 0 => SEQUENCE,
             state if state != PG | WORDS || bytes != 4 => PARALLELISM,
-            _ => match self.sectors.write(offset as u32, &value.to_le_bytes()) {
+            _ => match self.sectors.program(offset as u32, value.to_le_bytes()) {
                 Ok(()) => 0,
                 Err(_) => PROTECTED,
             },
@@ -153,10 +153,9 @@ impl FlashModel {
     }
 
     fn erase(&mut self, sector: u32, now_ns: u64) {
-        let from = sector.wrapping_sub(1).wrapping_mul(SECTOR);
-        // Of the other sectors none is the program's to erase.
+        // The program may erase only its own sectors.
         let is_own = matches!(sector, 1 | 2) && self.control & (0b11 << 8) == WORDS;
-        if !is_own || self.sectors.erase(from, from + SECTOR).is_err() {
+        if !is_own || self.sectors.erase(sector as u8 - 1).is_err() {
             self.status |= PROTECTED;
         }
         self.erases += u64::from(is_own);

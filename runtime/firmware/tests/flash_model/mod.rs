@@ -1,44 +1,37 @@
-//! Two sectors of NOR flash, and what a cut of the power leaves in them. Written from what is
-//! known of flash, not from the store.
+//! A model of two sectors of NOR flash and of cuts of the power, written from documents of flash, not from the store.
 //!
-//! - Programming lets bits fall, a word at a time, also in a word that is not blank (RM0090
-//!   rev. 21, section 3.6.4). Only the erase of a whole sector raises bits (3.6.3).
-//! - After a reset in an operation, contents are not guaranteed (3.6). Of a word that was being
-//!   programmed, each bit that should fall has fallen or not.
-//! - An erase that was interrupted leaves any mixture of raised bits, bits as they were, and
-//!   fallen bits: NOR flash is programmed to 0 before it is erased (the Linux change "UBI: fix
-//!   NOR flash recovery", for a Spansion S29GL512N).
-//! - Such bits stay as they are, or read anew after each start (the "unstable bits" of UBIFS),
-//!   until they are programmed to 0 or erased to the end. Programming again the bits that were
-//!   to fall makes them fall for good.
+//! - Programming lets bits fall, a word at a time, also in a word that is not blank (RM0090 rev. 21, section
+//!   3.6.4). Only the erase of a whole sector raises bits (3.6.3).
+//! - After a reset in an operation, contents are not guaranteed (3.6). In a word that was being programmed, each
+//!   bit that should fall has fallen or not.
+//! - An interrupted erase ends in any mixture of raised, unchanged and fallen bits: NOR flash is programmed to 0
+//!   before it is erased (the Linux change "UBI: fix NOR flash recovery", for a Spansion S29GL512N).
+//! - Such bits stay, or read anew after each start (the "unstable bits" of UBIFS), until they are programmed to 0
+//!   or erased to the end. Programming again the bits that were to fall makes them fall for good.
 //!
-//! Not modelled: wear beyond a word that is stuck, disturbed neighbours, and bits that change
-//! without a cut.
+//! Not modelled: wear beyond a stuck word, disturbed neighbours, and bits that change without a cut.
 
 extern crate std;
 
-use super::{FlashFault, SLOT_BYTES};
-use embedded_storage::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
-};
+use super::{Flash, NotWritten, SLOT_BYTES};
 use std::vec;
 use std::vec::Vec;
 
 const BYTES: usize = 2 * SLOT_BYTES as usize;
 
-/// Where in an operation the power fails.
+/// The place of a cut in an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
-    /// Nothing has changed.
+    /// Before any change.
     Before,
-    /// Some bits have.
+    /// Some bits have changed.
     Inside,
     /// The operation is complete, but its end is not reported.
     After,
 }
 
 impl Cut {
-    /// Each.
+    /// All places.
     pub const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
 }
 
@@ -66,7 +59,7 @@ impl Words {
         self.draw() % n
     }
 
-    /// A word in which each bit is 1 with the probability `eighths` / 8.
+    /// A word; each bit is 1 with the probability `eighths` / 8.
     fn biased(&mut self, eighths: u32) -> u32 {
         if eighths >= 8 {
             return u32::MAX;
@@ -87,7 +80,7 @@ struct Weak {
     eighths: u32,
 }
 
-/// Two sectors, with what a cut of the power leaves in them. Two are equal if they read the same.
+/// Two sectors of flash. Two models are equal if they read the same.
 #[derive(Clone, Debug)]
 pub struct FlashModel {
     bytes: Vec<u8>,
@@ -105,10 +98,10 @@ pub struct FlashModel {
     pub stuck: Option<usize>,
 }
 
-const OFF: FlashFault = FlashFault::Reported { status: 0 };
+const OFF: NotWritten = NotWritten::Failed;
 
 impl FlashModel {
-    /// Both sectors as they come from the factory.
+    /// Both sectors erased.
     #[must_use]
     pub fn erased() -> Self {
         Self {
@@ -124,7 +117,7 @@ impl FlashModel {
         }
     }
 
-    /// Contents of a slot as a probe writes them.
+    /// Writes a slot like a probe.
     ///
     /// # Panics
     /// If they are longer than a sector.
@@ -176,8 +169,8 @@ impl FlashModel {
         }
     }
 
-    /// Whether this operation is cut, and where.
-    fn next(&mut self) -> Result<Option<Cut>, FlashFault> {
+    /// The cut of this operation.
+    fn next(&mut self) -> Result<Option<Cut>, NotWritten> {
         if self.off {
             return Err(OFF);
         }
@@ -190,24 +183,31 @@ impl FlashModel {
         Ok(cut)
     }
 
-    fn end(&self, cut: Option<Cut>) -> Result<(), FlashFault> {
+    fn end(&self, cut: Option<Cut>) -> Result<(), NotWritten> {
         if cut.is_some() || self.reports == Some(self.operations - 1) {
             return Err(OFF);
         }
         Ok(())
     }
+}
 
-    fn program(&mut self, word: usize, value: u32) -> Result<(), FlashFault> {
+impl Flash for FlashModel {
+    fn read(&self, offset: u32, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+    }
+
+    fn program(&mut self, offset: u32, value: [u8; 4]) -> Result<(), NotWritten> {
+        assert_eq!(offset % 4, 0, "an address of a word");
+        let (word, value) = (offset as usize / 4, u32::from_le_bytes(value));
         let cut = self.next()?;
         let old = self.word(word);
-        let falling = old & !value;
+        let bits = old & !value;
         match cut {
             Some(Cut::Before) => {}
             Some(Cut::Inside) => {
                 let eighths = self.words.below(9);
-                let risen = self.words.biased(eighths) & falling;
-                self.put(word, old & !falling | risen);
-                let bits = falling;
+                let risen = self.words.biased(eighths) & bits;
+                self.put(word, old & !bits | risen);
                 self.weak.push(Weak {
                     word,
                     bits,
@@ -216,7 +216,7 @@ impl FlashModel {
             }
             Some(Cut::After) | None => {
                 self.put(word, old & value);
-                // Bits that are driven to 0, weak ones too, are 0 for good.
+                // Bits that are driven to 0, weak bits too, are 0 for good.
                 for weak in self.weak.iter_mut().filter(|weak| weak.word == word) {
                     weak.bits &= value;
                 }
@@ -224,73 +224,54 @@ impl FlashModel {
         }
         self.end(cut)
     }
-}
 
-impl ErrorType for FlashModel {
-    type Error = FlashFault;
-}
-
-impl ReadNorFlash for FlashModel {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFault> {
-        check_read(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
-        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        BYTES
-    }
-}
-
-impl NorFlash for FlashModel {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SLOT_BYTES as usize;
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashFault> {
-        check_write(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
-        let words = bytes.as_chunks().0.iter().zip(offset as usize / 4..);
-        for (value, word) in words {
-            self.program(word, u32::from_le_bytes(*value))?;
-        }
-        Ok(())
-    }
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashFault> {
-        check_erase(self, from, to).map_err(FlashFault::Argument)?;
-        let (from, to) = (from as usize / 4, to as usize / 4);
+    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
+        const WORDS: usize = SLOT_BYTES as usize / 4;
+        let from = usize::from(slot) * WORDS;
         let cut = self.next()?;
         if cut == Some(Cut::Before) {
             return self.end(cut);
         }
-        self.weak.retain(|weak| !(from..to).contains(&weak.word));
-        // How far it came: bits fall first, in part of the sector, then all rise.
+        self.weak
+            .retain(|weak| !(from..from + WORDS).contains(&weak.word));
+        // The progress of the erase: bits fall first, in part of the sector, then all rise.
         let (eighths, falls) = (self.words.below(9), self.words.below(3) == 0);
-        for word in from..to {
+        for word in from..from + WORDS {
             if cut != Some(Cut::Inside) {
                 self.put(word, u32::MAX);
                 continue;
             }
             let (drawn, old) = (self.words.biased(eighths), self.word(word));
             self.put(word, if falls { old & drawn } else { old | drawn });
-            let eighths = if self.unstable {
+            let weak_eighths = if self.unstable {
                 self.words.below(9)
             } else {
                 0
             };
-            let bits = u32::MAX;
             self.weak.push(Weak {
                 word,
-                bits,
-                eighths,
+                bits: u32::MAX,
+                eighths: weak_eighths,
             });
         }
         self.end(cut)
     }
 }
 
-impl MultiwriteNorFlash for FlashModel {}
+/// For stores that borrow their flash.
+impl Flash for &mut FlashModel {
+    fn read(&self, offset: u32, bytes: &mut [u8]) {
+        (**self).read(offset, bytes);
+    }
+
+    fn program(&mut self, offset: u32, value: [u8; 4]) -> Result<(), NotWritten> {
+        (**self).program(offset, value)
+    }
+
+    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
+        (**self).erase(slot)
+    }
+}
 
 impl PartialEq for FlashModel {
     fn eq(&self, other: &Self) -> bool {
@@ -299,34 +280,17 @@ impl PartialEq for FlashModel {
 }
 
 #[test]
-fn bits_only_fall_until_the_sector_is_erased() {
-    let mut flash = FlashModel::erased();
-    for (value, reads) in [
-        (0xffff_00ff, 0xffff_00ff),
-        (0x0fff_ffff, 0x0fff_00ff),
-        (u32::MAX, 0x0fff_00ff),
-    ] {
-        assert_eq!(flash.program(7, value), Ok(()));
-        assert_eq!(flash.word(7), reads);
-    }
-    assert_eq!(flash.erase(SLOT_BYTES, 2 * SLOT_BYTES), Ok(()));
-    assert_eq!(flash.word(7), 0x0fff_00ff);
-    assert_eq!(flash.erase(0, SLOT_BYTES), Ok(()));
-    assert_eq!(flash, FlashModel::erased());
-}
-
-#[test]
 fn a_cut_leaves_bits_between_and_lets_nothing_follow() {
-    let wrote = 0x00ff_f00f;
+    let wrote = 0x00ff_f00f_u32;
     let mut seen = [false; 3];
     for seed in 0..64 {
         let mut flash = FlashModel::erased();
         flash.seed(seed);
         flash.cut_at(1, Cut::Inside);
-        assert_eq!(flash.program(0, wrote), Ok(()));
-        assert_eq!(flash.program(1, wrote), Err(OFF));
-        assert_eq!(flash.program(2, wrote), Err(OFF));
-        assert_eq!(flash.erase(0, SLOT_BYTES), Err(OFF));
+        assert_eq!(flash.program(0, wrote.to_le_bytes()), Ok(()));
+        assert_eq!(flash.program(4, wrote.to_le_bytes()), Err(OFF));
+        assert_eq!(flash.program(8, wrote.to_le_bytes()), Err(OFF));
+        assert_eq!(flash.erase(0), Err(OFF));
         let torn = flash.word(1);
         assert_eq!((flash.word(0), flash.word(2)), (wrote, u32::MAX));
         assert_eq!(torn & wrote, wrote);
@@ -336,7 +300,7 @@ fn a_cut_leaves_bits_between_and_lets_nothing_follow() {
         seen[2] |= flash.word(1) != torn;
         assert!(flash.unstable || flash.word(1) == torn);
         // Programmed again, it is as it should be, for good.
-        assert_eq!(flash.program(1, wrote), Ok(()));
+        assert_eq!(flash.program(4, wrote.to_le_bytes()), Ok(()));
         flash.power_on();
         assert_eq!(flash.word(1), wrote);
     }
@@ -353,7 +317,7 @@ fn a_cut_erase_leaves_any_mixture_in_its_sector_only() {
         flash.load(0, &[0x5a; SLOT_BYTES as usize]);
         flash.load(1, &[0x33; SLOT_BYTES as usize]);
         flash.cut_at(0, Cut::Inside);
-        assert_eq!(flash.erase(0, SLOT_BYTES), Err(OFF));
+        assert_eq!(flash.erase(0), Err(OFF));
         assert!(flash.bytes[sector..].iter().all(|&b| b == 0x33));
         for &byte in &flash.bytes[..sector] {
             risen += (byte & !0x5a).count_ones();
@@ -363,7 +327,7 @@ fn a_cut_erase_leaves_any_mixture_in_its_sector_only() {
         let before = flash.clone();
         flash.power_on();
         assert_eq!(flash == before, !flash.unstable);
-        assert_eq!(flash.erase(0, SLOT_BYTES), Ok(()));
+        assert_eq!(flash.erase(0), Ok(()));
         flash.power_on();
         assert!(flash.bytes[..sector].iter().all(|&b| b == 0xff));
     }
