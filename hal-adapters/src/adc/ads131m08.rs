@@ -17,15 +17,14 @@
 //!
 //! **Which conversion is read.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a conversion
 //! takes 64 us. Three of them after a resynchronisation the filters are settled. The sheet does not
-//! say whether conversions end at multiples of 64 us after SYNC or 11 us later (44 modulator periods,
-//! table 8-3; 300 of them after a reset, 8.4.2), whether what is not settled is held back, which of
-//! three conversions a full store of two loses, and whether one leaves the store when its frame begins
-//! or when it ends. A tick relies on none of this:
+//! say whether conversions end at multiples of 64 us after SYNC or 11 us later (44 modulator periods, table 8-3; 300
+//! after a reset, 8.4.2), whether unsettled conversions are held back, which of three conversions a full store of two
+//! loses, and whether a conversion is removed when its frame begins or ends. A tick relies on none of this:
 //!
 //! 1. A pulse on SYNC/RESET at the trigger restarts the filters of all channels.
 //! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 207 us later a frame removes the older of the two
-//!    conversions that may be stored. It ends before the next conversion does, at 256 us: that one
-//!    finds room in any case.
+//!    conversions that may be stored. It ends before the next conversion does, at 256 us, so there is room for that
+//!    conversion.
 //! 3. A second frame removes the other. The third carries the conversion that ended 256 or 267 us
 //!    after the trigger, settled in any case. If it is not there yet, the ready bits say so, and a fourth
 //!    frame carries it.
@@ -49,7 +48,7 @@
 //!   mean that its wire is broken;
 //! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
 //!
-//! The trigger after a failed start leaves SYNC/RESET low for one period: a reset that also helps
+//! The trigger after a failed start holds SYNC/RESET low for one period: a reset that also helps
 //! a part that ignores commands because its interface is locked or its word length changed. After
 //! power-up the part ignores the SPI for 250 us (typical): a start in that time fails, too.
 //!
@@ -142,6 +141,12 @@ struct Frame {
 }
 
 impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
+    /// An input, as the source of its voltage sees it.
+    pub const INPUT: AnalogInput = AnalogInput {
+        codes_per_v: 8_388_608.0 / 1.2,
+        ohm: 330e3,
+    };
+
     /// A part that is not started yet; `sync` drives SYNC/RESET.
     pub const fn new(spi: SPI, sync: SYNC, channels: Channels) -> Self {
         Self {
@@ -152,7 +157,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
             status_is_next: false,
             unsynced_ticks: 0,
             start_failed: false,
-            temperatures: Held::NOTHING,
+            temperatures: Held::MISSING,
         }
     }
 
@@ -186,16 +191,11 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         Ok(frame)
     }
 
-    /// The inputs that are converted.
-    const fn enabled(&self) -> u8 {
-        self.channels.mask() | self.channels.thermometer_mask()
-    }
-
     /// The value that a register must have: 0x02 to 0x30.
     const fn wanted(&self, register: u8) -> u16 {
         match register {
             MODE_REGISTER => MODE_WANTED,
-            CLOCK => (self.enabled() as u16) << 8 | CLOCK_SPEED,
+            CLOCK => (self.channels.read_mask() as u16) << 8 | CLOCK_SPEED,
             CFG => CFG_WANTED,
             GAIN_0.. if (register - GAIN_0).is_multiple_of(CHANNEL_REGISTERS) => GAIN_WANTED,
             _ => 0,
@@ -209,7 +209,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
             Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
             Ok(_) | Err(_) => delay.delay_us(RESET_US),
         }
-        // Each frame answers the one before it.
+        // Each frame answers the previous command.
         let (read, write) = (|r: u8| READ | address(r), |r: u8| WRITE | address(r));
         let found = self.exchange(read(ID), 0)?.response;
         check_id(found, u16::MAX, RESET_DONE)?;
@@ -265,16 +265,11 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     /// 171 us.
     const SAMPLE_US: u32 = 166;
     const CODE_BITS: u32 = 24;
-    const INPUT: AnalogInput = AnalogInput {
-        codes_per_v: 8_388_608.0 / 1.2,
-        ohm: 330e3,
-        bias_v: 0.0,
-    };
 
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         // What was set raises the flag of changed registers: the next STATUS is not looked at.
         self.status_is_next = false;
-        self.temperatures = Held::NOTHING;
+        self.temperatures = Held::MISSING;
         self.turn = MODE_REGISTER;
         let result = self.try_start(delay);
         self.start_failed = result.is_err();
@@ -294,7 +289,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     }
 
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
-        let (register, read) = (self.turn, self.enabled());
+        let (register, read) = (self.turn, self.channels.read_mask());
         self.turn = if register < LAST_REGISTER {
             register + 1
         } else {
@@ -306,7 +301,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         let first = self.exchange(READ | address(register), 0)?.response;
         let found = self.exchange(NULL, 0)?.response;
         let mut frame = self.exchange(NULL, 0)?;
-        // A status reports each event once: that of a frame without codes counts, too.
+        // A status reports each event once: the status of a frame without codes counts, too.
         let third = frame.response;
         if !is_ready(&frame) {
             frame = self.exchange(NULL, 0)?;
@@ -327,12 +322,10 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
             return Err(AdcError::NotReady { ready, read });
         }
         self.count_unsynced(statuses)?;
-        if let Some(due) = self.temperatures.due(&self.channels, time_us) {
-            let code = frame.codes[usize::from(due.1.input & 7)];
-            self.temperatures.take(due, code);
-        }
         let sampled = self.channels.frame(&frame.codes, sequence, time_us);
-        Ok(sampled.with_temperature_mc(self.temperatures.temperature_mc()))
+        let thermometers = &self.channels.thermometers;
+        let temperature_mc = (self.temperatures).at(thermometers, &frame.codes, time_us);
+        Ok(sampled.with_temperature_mc(temperature_mc))
     }
 }
 

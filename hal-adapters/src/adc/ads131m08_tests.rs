@@ -55,7 +55,7 @@ fn try_start(expected: &[Frames]) -> Result<(), AdcError<ErrorKind>> {
     })
 }
 
-/// What so many ticks give whose frames are `expected`.
+/// The samples of `count` ticks. Their frames must be `expected`.
 fn ticks(count: usize, expected: &[Frames]) -> Vec<Sampled> {
     on_part(Ads131m08::new, &expected.concat(), &[], |adc| {
         (0..count).map(|_| adc.sample(7, 14_000)).collect()
@@ -72,7 +72,7 @@ fn tick(status: u16, register: u16, found: u16, back: Vec<u8>) -> Frames {
     .concat()
 }
 
-/// The first tick after a start, in which the first frame answers something else.
+/// The first tick after a start: its first frame answers another command.
 fn try_sample(back: Vec<u8>) -> Sampled {
     ticks(1, &[tick(0x2110, 0x02, 0x2110, back)])[0]
 }
@@ -175,7 +175,7 @@ fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
             wanted: 0x0100,
         };
         assert_eq!(try_sample(answer(found, QUIET)), Err(error));
-        // In the first frame of a tick, too, unless the one before it was not read to its end.
+        // In the first frame of a tick, too, after a tick that was read to its end.
         let good = || answer(0x413f, QUIET);
         let both = [
             tick(0, 0x02, 0x2110, good()),
@@ -200,7 +200,7 @@ fn a_conversion_that_is_not_there_yet_gets_one_more_frame() {
     );
 }
 
-/// The values after a reset are those of the data sheet's table 8-12.
+/// The values after a reset come from the data sheet's table 8-12.
 #[test]
 fn every_register_is_read_back_in_turn() {
     let at_reset = |register: u16| match register {

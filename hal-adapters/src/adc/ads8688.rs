@@ -10,7 +10,6 @@
 //! | NO_OP | 0x0000 | next channel of the sequence |
 //! | RST | 0x8500 | registers as after power-up |
 //! | AUTO_RST | 0xA000 | the next frame starts the sequence with its lowest channel |
-//! | MAN_Ch_n | 0xC000 + 0x400 n | the next frame samples channel n: a thermometer |
 //! | write, read | address (7 bits), 1 or 0, value | the answer is the value written or read |
 //!
 //! | register | address | value after reset | here |
@@ -31,8 +30,8 @@
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
 //! its input range (3 bits), and all three are checked. A flipped bit in the code itself goes
 //! unnoticed: prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick
-//! reads one register back, or a thermometer where one is due: all registers in turn, in 24 ms. (It
-//! comes last because only the AUTO_RST of the next tick starts the sequence again.)
+//! reads one register back: all registers in turn, in 24 ms. (It comes last because only the AUTO_RST of the
+//! next tick starts the sequence again.) This driver reads no thermometers.
 //!
 //! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
 //! sample to sample it takes one frame, about 6 us; the part needs 2 us.
@@ -45,25 +44,22 @@
 //!
 //! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
 //! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`. The
-//! inputs have 1 MOhm: one that is not connected reads a code like any other, see the wiring table of
-//! the firmware for the resistor that makes it read a rail.
+//! inputs have 1 MOhm: an open input reads a code like any other. A resistor of 220 kOhm to +15 V makes it read
+//! a rail.
 
 use super::channels::INPUTS;
-use super::thermometer::{AnalogInput, Held};
 use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
 
-/// Bytes of a frame: command, code, signature and range, of which the last bit is in the sixth.
+/// Bytes of a frame: command, code, signature and range. The last bit of the range is in the sixth byte.
 const FRAME_BYTES: usize = 6;
 
 const NO_OP: u16 = 0x0000;
 const RST: u16 = 0x8500;
 const AUTO_RST: u16 = 0xa000;
-/// That of input 0; each further one is 0x400 more.
-const MAN_CH_0: u16 = 0xc000;
 
 const AUTO_SEQ_EN: u8 = 0x01;
 const AUTO_SEQ_EN_AT_RESET: u16 = 0xff;
@@ -93,7 +89,6 @@ pub struct Ads8688<SPI, RST> {
     /// Register that the next tick reads back.
     turn: u8,
     reference: Reference,
-    temperatures: Held,
 }
 
 /// Whether codes can be right.
@@ -115,7 +110,6 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
             channels,
             turn: AUTO_SEQ_EN,
             reference: Reference::Started,
-            temperatures: Held::NOTHING,
         }
     }
 
@@ -142,15 +136,15 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
     const fn wanted(&self, register: u8) -> u16 {
         match register {
             AUTO_SEQ_EN => self.channels.mask() as u16,
-            POWER_DOWN => !(self.channels.mask() | self.channels.thermometer_mask()) as u16,
+            POWER_DOWN => !self.channels.mask() as u16,
             FEATURES => FEATURES_WANTED,
             _ => RANGE_10_24_V,
         }
     }
 
-    /// The code of an input that the frame before has selected.
-    fn code(&mut self, input: u8, command: u16) -> Result<i32, AdcError<SPI::Error>> {
-        let bytes = self.exchange(command)?;
+    /// The code of an input that the previous frame has selected.
+    fn code(&mut self, input: u8) -> Result<i32, AdcError<SPI::Error>> {
+        let bytes = self.exchange(NO_OP)?;
         let [_, _, high, low, signature, last] = bytes;
         let (found, expected) = (signature & SIGNATURE_MASK, input << 4 | DEVICE_SIGNATURE);
         if found != expected {
@@ -202,16 +196,8 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
 
     const CODE_BITS: u32 = 16;
 
-    /// Its current is that of 1 MOhm to 2.25 V (7.5, input leakage current).
-    const INPUT: AnalogInput = AnalogInput {
-        codes_per_v: 3_200.0,
-        ohm: 1e6,
-        bias_v: 2.25,
-    };
-
     fn start(&mut self, _delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         self.reference = Reference::Started;
-        self.temperatures = Held::NOTHING;
         self.turn = AUTO_SEQ_EN;
         self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         self.exchange(RST)?;
@@ -220,7 +206,7 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         for register in [AUTO_SEQ_EN, POWER_DOWN, FEATURES] {
             self.set(register)?;
         }
-        let read = self.channels.mask() | self.channels.thermometer_mask();
+        let read = self.channels.mask();
         for input in (0..8).filter(|input| read & 1 << input != 0) {
             self.set(RANGE_0 + input)?;
         }
@@ -232,38 +218,24 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     }
 
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
-        let due = self.temperatures.due(&self.channels, time_us);
         self.exchange(AUTO_RST)?;
         let mut codes = [0; INPUTS];
         let read = self.channels.mask();
         let slots = (0u8..).zip(codes.iter_mut());
         for (input, code) in slots.filter(|(input, _)| read & 1 << input != 0) {
-            let command = match due {
-                Some((_, thermometer)) if read >> input == 1 => {
-                    MAN_CH_0 | u16::from(thermometer.input) << 10
-                }
-                _ => NO_OP,
-            };
-            *code = self.code(input, command)?;
+            *code = self.code(input)?;
         }
-        if let Some(due) = due {
-            let code = self.code(due.1.input, NO_OP)?;
-            self.temperatures.take(due, code);
-        } else {
-            let register = self.turn;
-            self.turn = match register {
-                LAST_REGISTER.. => AUTO_SEQ_EN,
-                FEATURES => RANGE_0,
-                _ => register + 1,
-            };
-            self.check(register)?;
-        }
+        let register = self.turn;
+        self.turn = match register {
+            LAST_REGISTER.. => AUTO_SEQ_EN,
+            FEATURES => RANGE_0,
+            _ => register + 1,
+        };
+        self.check(register)?;
         if !self.settled(time_us) {
-            self.temperatures = Held::NOTHING;
             return Err(AdcError::NotReady { ready: 0, read });
         }
-        let sampled = self.channels.frame(&codes, sequence, time_us);
-        Ok(sampled.with_temperature_mc(self.temperatures.temperature_mc()))
+        Ok(self.channels.frame(&codes, sequence, time_us))
     }
 }
 

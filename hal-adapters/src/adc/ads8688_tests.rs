@@ -2,7 +2,7 @@
 
 extern crate std;
 
-use super::super::testing::{self, Broken, Frames, keeps_the_error_of_the_bus, transfer};
+use super::super::testing::{self, Frames, keeps_the_error_of_the_bus, transfer};
 use super::*;
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
@@ -11,7 +11,7 @@ use embedded_hal_mock::eh1::spi::Mock;
 use std::vec;
 use std::vec::Vec;
 
-/// What `work` gives on a part whose bus carries exactly `expected` and whose reference has settled.
+/// Runs `work` on a settled part. Its bus must carry exactly `expected`.
 fn on_part<T>(expected: &Frames, work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock>) -> T) -> T {
     testing::on_part(Ads8688::new, expected, &[], |adc| {
         adc.reference = Reference::Settled;
@@ -168,30 +168,4 @@ fn a_code_of_another_range_is_refused() {
 #[test]
 fn the_error_of_the_bus_is_kept() {
     keeps_the_error_of_the_bus(Ads8688::new);
-}
-
-/// The frame of the last code selects the thermometer's channel, and the next one has its code in place of
-/// a register; 100 ms later again.
-#[test]
-fn a_thermometer_is_read_in_place_of_a_register() {
-    use crate::adc::thermometer::{Thermometer, tmp235};
-    static CODES: [i32; 2] = tmp235::codes(&<Ads8688<Broken, PinMock>>::INPUT);
-    static BODY: Thermometer = Thermometer {
-        input: 7,
-        curve: tmp235::curve(&CODES),
-    };
-    let channels = Channels::IN_ORDER.with_thermometers([None, Some(&BODY)]);
-    // 0.75 V are 25 degC and 2400 codes.
-    let mut warm = sampled(ZERO);
-    warm.truncate(6 * 3);
-    warm.extend(frame([0xdc, 0x00], [0x80, 0, 0x54]));
-    warm.extend(frame([0, 0], [0x89, 0x60, 0x74]));
-    let all = [warm.clone(), tick(0x01, 0x3f), warm].concat();
-    on_part(&all, |adc| {
-        adc.channels = channels.expect("a free input");
-        for (time_us, body_mc) in [(0, 25_000), (99_999, 25_000), (100_000, 25_000)] {
-            let read = adc.sample(7, time_us).map(|frame| frame.temperature_mc);
-            assert_eq!(read, Ok([runtime::frame::MISSING_CODE, body_mc]));
-        }
-    });
 }

@@ -1,4 +1,4 @@
-//! Which input of the converter carries which sensor.
+//! The inputs of the sensors.
 
 use super::thermometer::Thermometer;
 use runtime::RawFrame;
@@ -22,65 +22,52 @@ impl Channels {
         thermometers: [None; 2],
     };
 
-    /// The inputs of Hall probes A, B, C and of capacitive gaps 1, 2, 3; `None` unless all
-    /// six are below 8 and differ.
+    /// The inputs of Hall probes A, B, C and of capacitive gaps 1, 2, 3; `None` unless all six are below 8 and
+    /// differ.
     pub const fn new(hall: [u8; 3], capacitive: [u8; 3]) -> Option<Self> {
-        let all = [
-            hall[0],
-            hall[1],
-            hall[2],
-            capacitive[0],
-            capacitive[1],
-            capacitive[2],
-        ];
-        let (mut mask, mut k) = (0u32, 0);
-        while k < all.len() {
-            if all[k] as usize >= INPUTS || mask & (1 << all[k]) != 0 {
-                return None;
-            }
-            mask |= 1 << all[k];
-            k += 1;
-        }
-        Some(Self {
+        let ([a, b, c], [d, e, f]) = (hall, capacitive);
+        let channels = Self {
             hall,
             capacitive,
             thermometers: [None; 2],
-        })
+        };
+        match with_inputs(0, &[a, b, c, d, e, f]) {
+            Some(_) => Some(channels),
+            None => None,
+        }
     }
 
-    /// With thermometers at the magnets' mount and on the stage body at the Hall elements; `None` unless
-    /// their inputs are below 8 and free.
+    /// With thermometers at the magnets' mount and on the stage body at the Hall elements; `None` unless their inputs
+    /// are below 8 and free.
     #[must_use]
     pub const fn with_thermometers(
         self,
         thermometers: [Option<&'static Thermometer>; 2],
     ) -> Option<Self> {
-        let (mut mask, mut k) = (self.mask() as u32, 0);
-        while k < thermometers.len() {
-            if let Some(Thermometer { input, .. }) = thermometers[k] {
-                if *input as usize >= INPUTS || mask & (1 << *input) != 0 {
-                    return None;
-                }
-                mask |= 1 << *input;
-            }
-            k += 1;
-        }
-        Some(Self {
+        let with = Self {
             thermometers,
             ..self
-        })
+        };
+        match with.checked_mask() {
+            Some(_) => Some(with),
+            None => None,
+        }
     }
 
-    /// The inputs of the thermometers: bit k for input k.
-    pub(super) const fn thermometer_mask(&self) -> u8 {
-        let (mut mask, mut k) = (0, 0);
-        while k < self.thermometers.len() {
-            if let Some(Thermometer { input, .. }) = self.thermometers[k] {
-                mask |= 1 << (*input & 7);
-            }
-            k += 1;
+    /// The inputs that are read, thermometers included: bit k for input k.
+    pub(super) const fn read_mask(&self) -> u8 {
+        match self.checked_mask() {
+            Some(mask) => mask,
+            None => 0,
         }
-        mask
+    }
+
+    const fn checked_mask(&self) -> Option<u8> {
+        match self.thermometers {
+            [Some(mount), Some(body)] => with_inputs(self.mask(), &[mount.input, body.input]),
+            [Some(one), None] | [None, Some(one)] => with_inputs(self.mask(), &[one.input]),
+            [None, None] => Some(self.mask()),
+        }
     }
 
     /// The inputs of the six sensors: bit k for input k.
@@ -89,28 +76,26 @@ impl Channels {
         1 << a | 1 << b | 1 << c | 1 << d | 1 << e | 1 << f
     }
 
-    /// The frame of one period, out of the codes of all inputs.
-    pub(super) const fn frame(
-        &self,
-        codes: &[i32; INPUTS],
-        sequence: u32,
-        time_us: u32,
-    ) -> RawFrame {
-        // Every index is below 8 already: the masks let the compiler drop its check, and the panic.
-        const fn three(codes: &[i32; INPUTS], at: [u8; 3]) -> [i32; 3] {
-            [
-                codes[(at[0] & 7) as usize],
-                codes[(at[1] & 7) as usize],
-                codes[(at[2] & 7) as usize],
-            ]
-        }
-        RawFrame::new(
-            three(codes, self.hall),
-            three(codes, self.capacitive),
-            sequence,
-            time_us,
-        )
+    /// The frame of one period, from the codes of all inputs.
+    pub(super) fn frame(&self, codes: &[i32; INPUTS], sequence: u32, time_us: u32) -> RawFrame {
+        // Every index is below 8 already: the mask lets the compiler drop its check, and the panic.
+        let code = |input: u8| codes[usize::from(input & 7)];
+        let (hall, capacitive) = (self.hall.map(code), self.capacitive.map(code));
+        RawFrame::new(hall, capacitive, sequence, time_us)
     }
+}
+
+/// A mask with further inputs; `None` if one is not below 8, or taken.
+const fn with_inputs(mut mask: u8, inputs: &[u8]) -> Option<u8> {
+    let mut k = 0;
+    while k < inputs.len() {
+        if inputs[k] as usize >= INPUTS || mask >> inputs[k] & 1 == 1 {
+            return None;
+        }
+        mask |= 1 << inputs[k];
+        k += 1;
+    }
+    Some(mask)
 }
 
 #[cfg(test)]
@@ -140,7 +125,7 @@ mod tests {
         assert_eq!(with(None, Some(at(8))), None);
         assert_eq!(with(Some(at(6)), Some(at(6))), None);
         let both = with(Some(at(7)), Some(at(6))).expect("free");
-        assert_eq!((both.mask(), both.thermometer_mask()), (0x3f, 0xc0));
+        assert_eq!((both.mask(), both.read_mask()), (0x3f, 0xff));
         assert_eq!(with(None, None), Some(Channels::IN_ORDER));
     }
 

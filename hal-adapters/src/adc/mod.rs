@@ -1,9 +1,9 @@
 //! Converters on SPI: six codes of one servo period into one [`RawFrame`].
 //!
-//! | module | part | what it is |
+//! | module | part | content |
 //! |---|---|---|
 //! | [`ads131m08`] | TI ADS131M08 | eight channels of 24 bits sampled at once, CRC over every frame |
-//! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits, sampled one after the other, no CRC |
+//! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits, sampled one after the other, no CRC; no thermometers |
 //! | [`Channels`] | any | which input carries which sensor |
 //! | [`thermometer`] | Semitec 103AT-2, TI TMP235 | temperatures of the magnets' mount and of the stage body at free inputs |
 //! | [`stuck`] | any | codes that never change: a converter or a sensor that is frozen |
@@ -15,9 +15,8 @@
 //! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, and the
 //! part's control pin. It allocates nothing, cannot panic, and its waits are fixed and short:
 //! 10 us for a reset in [`FrameSampler::start`], 1 us for a pulse in [`FrameSampler::trigger`].
-//! No published driver would do: the one for the ADS131M08 drives chip select and data-ready
-//! pins itself, waits 100 ms at start and returns the previous codes in place of damaged ones;
-//! for the ADS8688 there is none.
+//! The published driver for the ADS131M08 drives chip select and data-ready pins itself, waits 100 ms at start and
+//! returns the previous codes in place of damaged codes. There is no published driver for the ADS8688.
 //!
 //! ```
 //! use embedded_hal_mock::eh1::{delay::NoopDelay, digital, spi};
@@ -95,10 +94,7 @@ pub trait FrameSampler {
     /// Bits of a code: 16 or 24.
     const CODE_BITS: u32;
 
-    /// What an input is to the source of its voltage.
-    const INPUT: thermometer::AnalogInput;
-
-    /// Resets the part, checks what it is, sets it up and reads the settings back.
+    /// Resets the part, checks its identity, sets it up and reads the settings back.
     ///
     /// # Errors
     /// See [`AdcError`]; the part may then be in any state, and this may be called again.
@@ -111,8 +107,8 @@ pub trait FrameSampler {
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
     /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
-    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US). Its temperatures are those that were
-    /// read in the last 100 ms, one a period.
+    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US). Its temperatures were read in the last 100 ms, by a
+    /// driver that reads thermometers.
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors
@@ -224,7 +220,7 @@ fn check_id<B>(found: u16, mask: u16, expected: u16) -> Result<(), AdcError<B>> 
     }
 }
 
-/// Compares what a register has with what it must have.
+/// Compares the value of a register with the wanted value.
 fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
     if found == wanted {
         return Ok(());
@@ -260,7 +256,7 @@ mod testing {
         [start, transfer, end].into()
     }
 
-    /// What `work` gives on a part whose bus carries exactly `expected` and whose pin sees `levels`.
+    /// Runs `work` on a part. Its bus must carry exactly `expected`, its pin exactly `levels`.
     pub(super) fn on_part<S, T>(
         new: fn(Mock<u8>, PinMock, Channels) -> S,
         expected: &Frames,
@@ -284,7 +280,7 @@ mod testing {
         assert_eq!(part.sample(0, 0), Err(error));
     }
 
-    /// A pin that nothing hangs on.
+    /// An unconnected pin.
     pub(super) struct NoPin;
 
     impl embedded_hal::digital::ErrorType for NoPin {

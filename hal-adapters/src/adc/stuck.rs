@@ -16,9 +16,9 @@
 use super::AdcError;
 use runtime::RawFrame;
 
-/// So many repetitions of the code of a Hall probe are a fault.
+/// Repetitions of the code of a Hall probe that are a fault.
 pub const HALL_PERIODS: u8 = 8;
-/// So many repetitions of the code of a gap are a fault.
+/// Repetitions of the code of a gap that are a fault.
 pub const GAP_PERIODS: u8 = 32;
 
 /// Watches successive frames.
@@ -31,7 +31,7 @@ pub struct StuckWatch {
 }
 
 impl StuckWatch {
-    /// A watch over codes of so many bits, 2 to 32, that has seen no frame.
+    /// A watch over codes of `code_bits`, 2 to 32, before its first frame.
     pub const fn new(code_bits: u32) -> Self {
         let rail = i32::MAX >> (32 - code_bits);
         Self {
