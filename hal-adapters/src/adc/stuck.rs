@@ -80,8 +80,8 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Runs of `periods` repetitions a year that normal noise gives three sensors at rest, whose
-    /// mean is where codes repeat most: in the middle of a code.
+    /// Runs of `periods` repetitions a year by normal noise of three sensors at rest. Their mean is in the middle of a code,
+    /// where codes repeat most.
     fn false_alarms_a_year(deviation_codes: f64, periods: u8) -> f64 {
         const STEPS: i32 = 100;
         let density = |x: f64| {
@@ -117,7 +117,7 @@ mod tests {
         RawFrame::new([a, b, c], [d, e, f], sequence, 0)
     }
 
-    /// Codes of which only `channel` stays at `code`.
+    /// A frame of changing codes, but `channel` stays at `code`.
     fn only(channel: usize, code: i32, k: u32) -> RawFrame {
         let mut codes = [k as i32; 6];
         codes[channel] = code;

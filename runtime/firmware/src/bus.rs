@@ -1,8 +1,7 @@
 //! The CAN controller: emptied by the tick, filled by the tick and by interrupt, never waited for.
 //!
-//! Frames that are out of date after their tick are then taken back from the mailboxes, too. One
-//! that is on the wire at that moment is completed or fails, but is not repeated; its mailbox
-//! is empty only afterwards, and the outbox gives no further frame before (see there).
+//! Frames that are out of date after their tick are taken back from the mailboxes, too. A frame on the wire is then
+//! completed or fails, but is not repeated; the outbox gives no further frame before its mailbox is empty.
 
 use crate::board;
 use crate::random::Random;
@@ -23,14 +22,14 @@ const INIT_US: u32 = 1000;
 /// Ticks after which a controller that does not take part in the bus counts as apart: half a second. It
 /// waits for eleven recessive bits, which never come while RX is held low.
 const APART_TICKS: u16 = (TICKS_PER_S / 2) as u16;
-/// IDE in a mailbox's identifier register and in a filter: the identifier has 29 bits, of which the
-/// table's eleven come first, in the place of a standard one's (RM0090 rev. 18, 32.9.3 and 32.9.4).
+/// IDE in a mailbox's identifier register and in a filter: the identifier has 29 bits. The eleven bits of the table come
+/// first, in the place of a standard identifier (RM0090 rev. 18, 32.9.3 and 32.9.4).
 const EXTENDED: u32 = 1 << 2;
-/// Bits of TSR for mailbox 0; those of the next ones follow after eight bits each.
+/// Bits of TSR for mailbox 0; the bits of the next mailboxes follow after eight bits each.
 const REQUEST_COMPLETED: u32 = 1;
 const SENT: u32 = 1 << 1;
 const ABORT: u32 = 1 << 7;
-/// Bit of TSR: mailbox 0 is empty; those of the next ones follow.
+/// Bit of TSR: mailbox 0 is empty; the bits of the next mailboxes follow.
 const EMPTY: u32 = 1 << 26;
 const ALL_EMPTY: u32 = 0b111;
 
@@ -40,7 +39,7 @@ pub struct Bus {
     /// The bits of an identifier register that the node's number sets.
     node_bits: u32,
     started: bool,
-    /// Ticks in a row in which the controller took no part in the bus.
+    /// Ticks in a row while the controller took no part in the bus.
     apart_ticks: u16,
     was_off: bool,
     bus_off: u32,

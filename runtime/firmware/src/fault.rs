@@ -1,5 +1,5 @@
-//! What is done on a fault: it is noted in RAM that a reset leaves alone, and the core is reset.
-//! The next start reports it, see [`firmware::retained`].
+//! A fault is noted in RAM that survives a reset, and the core is reset. The next start reports the fault, see
+//! [`firmware::retained`].
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
@@ -15,8 +15,8 @@ static mut RETAINED: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
 pub fn retained() -> Option<Retained> {
     let mut words = [0; WORDS];
     for (k, word) in words.iter_mut().enumerate() {
-        // SAFETY: within the array, whose bits are valid words whatever they are; the only code
-        // that interrupts another access does not return to it.
+        // SAFETY: within the array; all bits are valid words. The only code that interrupts another access
+        // does not return to it.
         *word = unsafe { (&raw const RETAINED).cast::<u32>().add(k).read_volatile() };
     }
     Retained::from_words(&words)
@@ -64,9 +64,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     )
 }
 
-/// Makes every write to the 1 MiB below the stack a fault. Of what lies there, system memory and reserved
-/// addresses, the manual does not say that a write faults; the chip's identity and the one-time area, which
-/// lie there too, stay readable.
+/// Makes every write to the 1 MiB below the stack a fault. System memory and reserved addresses lie there; the manual is
+/// silent about writes to them. The chip's identity and the one-time area there stay readable.
 pub fn guard_stack(mpu: &mut MPU) {
     const BYTES_LOG2: u32 = 20;
     /// AP of the region: privileged code may read (ARMv7-M Architecture Reference Manual, B3.5).
@@ -75,7 +74,7 @@ pub fn guard_stack(mpu: &mut MPU) {
     /// Elsewhere the map of the core holds.
     const DEFAULT_MAP: u32 = 1 << 2;
     let below = (&raw const _stack_end as u32).wrapping_sub(1 << BYTES_LOG2);
-    // SAFETY: the program uses nothing in this region, and the rest of the map stays as it is.
+    // SAFETY: the program uses nothing in this region, and the rest of the map stays.
     unsafe {
         mpu.rnr.write(0);
         mpu.rbar.write(below);
@@ -97,8 +96,8 @@ unsafe fn NonMaskableInt() {
     reset_by(FaultKind::ClockFailed, 0, 0)
 }
 
-/// The stack pointer may be anywhere: puts it back before anything else and passes its value on. Nor
-/// are registers of the FPU to be stacked late, where the stack was: LSPACT, bit 0 of FPCCR, is cleared.
+/// The stack pointer may be anywhere: puts it back before anything else and passes its value on. Clears LSPACT, bit 0 of
+/// FPCCR, so that no registers of the FPU are stacked late, where the stack was.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {

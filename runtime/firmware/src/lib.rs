@@ -1,23 +1,23 @@
-//! What the stage controller does, apart from the chip that it does it on.
+//! The stage controller, apart from its chip.
 //!
 //! ```text
 //! timer --Schedule--> trigger --207 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
 //!                                          CAN commands --> Node          Telemetry <-- Node
 //! ```
 //!
-//! | module | what it holds |
+//! | module | content |
 //! |---|---|
-//! | [`schedule`] | ticks at multiples of 2 ms, and those that were missed |
-//! | [`acquisition`] | a converter that is started, read, and started again after faults |
-//! | [`store`] | two slots of flash, of which one takes a blob while the other one stays |
-//! | [`records`] | which parameters run, and new ones that come over the bus |
+//! | [`schedule`] | ticks at multiples of 2 ms, and missed ticks |
+//! | [`acquisition`] | reads the converter, and restarts it after faults |
+//! | [`store`] | two slots of flash: one takes a blob while the other stays |
+//! | [`records`] | the parameters that run, and new ones from the bus |
 //! | [`node`] | one tick: decode, report, obey |
-//! | [`light`] | what the LED shows |
+//! | [`light`] | the LED |
 //! | [`outbox`] | frames that wait for a mailbox |
-//! | [`telemetry`] | what a debugger reads |
-//! | [`start_up`] | what is known of the run that a reset ended |
-//! | [`retained`] | what survives a reset: the last fault, what ran, the zero deviation |
-//! | [`fpu`] | the rounding mode that the decoder relies on |
+//! | [`telemetry`] | the pose for a debugger |
+//! | [`start_up`] | how a start uses the record of the run before it |
+//! | [`retained`] | the record that survives a reset: last fault, running parameters, zero deviation |
+//! | [`fpu`] | the rounding mode of the decoder |
 //!
 //! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
 #![no_std]

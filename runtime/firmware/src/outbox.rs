@@ -1,10 +1,9 @@
 //! Frames that wait for a mailbox of the CAN controller.
 //!
-//! Of what waits in its three mailboxes the controller sends the lowest identifier first, and of
-//! two frames with the same identifier not always the older. The outbox keeps both from doing
-//! harm: the mailboxes hold one frame, or one group, at a time. A group is up to three frames
-//! with rising identifiers; the next frame is given when all mailboxes are empty. So frames
-//! leave in the order in which they were pushed.
+//! The controller sends the lowest identifier of its three mailboxes first, and the older of two equal identifiers
+//! not always first. Frames shall go out in the order of their pushes, so the mailboxes hold one frame, or one
+//! group, at a time. A group is up to three frames with rising identifiers. The next frame follows when all mailboxes
+//! are empty.
 
 use hal_adapters::can::{Coded, Message};
 use heapless::Deque;
@@ -15,11 +14,11 @@ const FRESH_MAX: usize = 11;
 /// Answers to the commands of a few ticks.
 const LASTING_MAX: usize = 8;
 
-/// A queue in two parts. Poses, codes, states and counters are out of date in the next tick,
-/// which discards and counts them; answers, which are sent only once, wait as long as it takes.
+/// A queue in two parts. The next tick discards and counts poses, codes, states and counters, which are then out of
+/// date. Answers are sent only once and wait as long as it takes.
 #[derive(Debug, Default)]
 pub struct Outbox {
-    /// Frames of this tick, and whether each may join the one before in the mailboxes.
+    /// Frames of this tick; true: it may join the previous frame in the mailboxes.
     fresh: Deque<(Coded, bool), FRESH_MAX>,
     lasting: Deque<Coded, LASTING_MAX>,
     dropped: u32,
@@ -60,8 +59,8 @@ impl Outbox {
         }
     }
 
-    /// The frame to be put into a mailbox next, if any may be now; it stays until [`Self::pop`].
-    /// `all_empty` is whether no mailbox holds a frame.
+    /// The next frame for a mailbox, if one may be filled now; it stays until [`Self::pop`]. `all_empty`: no mailbox holds
+    /// a frame.
     pub fn front(&self, all_empty: bool) -> Option<&Coded> {
         match self.fresh.front() {
             Some((frame, joins)) => (all_empty || *joins).then_some(frame),
@@ -69,7 +68,7 @@ impl Outbox {
         }
     }
 
-    /// Whether nothing waits.
+    /// Whether no frame waits.
     pub fn is_empty(&self) -> bool {
         self.front(true).is_none()
     }
@@ -80,7 +79,7 @@ impl Outbox {
         fresh.or_else(|| self.lasting.pop_front())
     }
 
-    /// Discards what is out of date of the previous tick.
+    /// Discards the frames of the previous tick that are out of date.
     pub fn start_tick(&mut self) {
         self.count_dropped(self.fresh.len() as u32);
         self.fresh.clear();

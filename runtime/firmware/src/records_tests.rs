@@ -19,7 +19,7 @@ fn what_runs_stays_however_much_is_stored_before_an_activation() {
     }
     let ran = crc(&blob(1));
     for (sequence, number) in [(3, 3), (4, 4), (5, 1), (6, 5)] {
-        // As after a reset: the other one waits.
+        // As after a reset: the newest blob waits.
         let choice = Choice::Blob(ran);
         let (mut records, _) = Records::start(&mut flash, choice, SERIAL);
         let place = Box::leak(Box::new(MaybeUninit::uninit()));

@@ -1,8 +1,7 @@
-//! What survives a reset in RAM that the start-up code leaves alone: the step of the start-up
-//! that was running, the last fault, the parameters that ran, and the zero deviation.
+//! The record in RAM that survives a reset: the step of the start-up, the last fault, the running parameters and the zero
+//! deviation.
 //!
-//! After power-on that RAM holds anything, and its content is not read. After any other reset
-//! it is used only if its check is right.
+//! After power-on the RAM holds noise and is not read. After any other reset it is used only if its check is right.
 
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use runtime::PlanarPose;
@@ -17,11 +16,11 @@ const CRASHED_BIT: u32 = 8;
 const PROVEN_BIT: u32 = 9;
 const ACTIVATED_BIT: u32 = 10;
 const EARLY_SHIFT: u32 = 16;
-/// After so many early faults in a row the program stops.
+/// Early faults in a row that stop the program.
 const EARLY_MAX: u8 = 2;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
-/// What the program was doing.
+/// The step of the program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Step {
@@ -110,17 +109,17 @@ pub struct Retained {
     pub early_faults: u8,
     /// Whether the program has run for a second since this start.
     pub proven: bool,
-    /// Whether the newest parameters are to run, whatever ran before.
+    /// Whether the newest parameters are to run.
     pub activated: bool,
     /// CRC of the blob that runs, or ran last; 0: none since power-on.
     pub running: u32,
-    /// The zero deviation that was measured with it, m and rad; that of an unmoved stage is zero.
+    /// The zero deviation that was measured with it, m and rad; zero before a re-zero.
     pub zero: PlanarPose<f32>,
 }
 
 impl Retained {
-    /// In place of a record that is damaged: neither what ran nor whether a zero deviation was set is
-    /// known, so that is not a number, which [`crate::node::Node::restore_zero`] does not take.
+    /// In place of a damaged record. The running blob is unknown, and so is the zero deviation: it is not a number, which
+    /// [`crate::node::Node::restore_zero`] refuses.
     pub fn damaged() -> Self {
         let zero = PlanarPose {
             x_m: f32::NAN,
@@ -132,12 +131,12 @@ impl Retained {
         }
     }
 
-    /// Whether it is in place of a damaged one.
+    /// Whether it stands in place of a damaged record.
     pub const fn is_damaged(&self) -> bool {
         self.zero.x_m.is_nan()
     }
 
-    /// Notes a fault in the step that runs. One of the crystal has its own remedy.
+    /// Notes a fault in the running step. A fault of the crystal has its own remedy.
     pub fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
         self.fault = Fault::new(kind, self.step, address, detail);
         self.faults = self.faults.saturating_add(1);
@@ -147,7 +146,7 @@ impl Retained {
         }
     }
 
-    /// The newest parameters run from the next start on; what was wrong is acknowledged.
+    /// The newest parameters run from the next start on; earlier faults are acknowledged.
     pub fn activate(&mut self) {
         self.activated = true;
         self.early_faults = 0;
@@ -166,7 +165,7 @@ impl Retained {
         self.early_faults >= EARLY_MAX
     }
 
-    /// The program has run for a second. One that stopped stays so.
+    /// The program has run for a second. A stopped program stays stopped.
     pub const fn prove(&mut self) {
         self.proven = true;
         if !self.has_faulted_twice() {

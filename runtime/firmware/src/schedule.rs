@@ -1,9 +1,8 @@
-//! The absolute schedule: tick n is due n periods after the start, however late the ticks
-//! before it came. A deadline of "now and a period" would drift.
+//! The absolute schedule: tick n is due n periods after the start, even after late ticks. A deadline of "now and a
+//! period" would drift.
 
-/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000. From 1 ms, in
-/// which a tick's frames leave at 1 Mbit/s, to 10 ms, half of the watchdog's period; whole ticks in a
-/// second.
+/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000. At least 1 ms, so that the frames of a
+/// tick fit at 1 Mbit/s; at most 10 ms, half of the watchdog's period; a divisor of a second.
 pub const PERIOD_US: u32 = match option_env!("STAGE_PERIOD_US") {
     Some(digits) => match u32::from_str_radix(digits, 10) {
         Ok(us) => us,
@@ -43,7 +42,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// A schedule whose first tick is due one period after `now_us`.
+    /// A schedule with its first tick one period after `now_us`.
     pub const fn starting(now_us: u32) -> Self {
         Self {
             due_us: now_us.wrapping_add(PERIOD_US),
@@ -62,8 +61,8 @@ impl Schedule {
         self.missed
     }
 
-    /// The tick that starts at `now_us`, which is not before the one that is due. If whole
-    /// periods have passed since then, their ticks are missed and this is the latest one.
+    /// The tick that starts at `now_us`, not before its due time. The ticks of whole periods since then are missed, and
+    /// this is the latest tick.
     pub const fn start_tick(&mut self, now_us: u32) -> Tick {
         let skipped = now_us.wrapping_sub(self.due_us) / PERIOD_US;
         let due_us = self.due_us.wrapping_add(skipped.wrapping_mul(PERIOD_US));

@@ -1,6 +1,5 @@
-//! The power is cut before, inside and after every operation on the flash, and again during the
-//! start that follows: the old blob is found or the new one, and nothing else. Words that do not
-//! hold, and a supply that drops.
+//! Cuts of the power before, inside and after every operation on the flash, and again during the start that follows: a
+//! start finds the old blob or the new one. And stuck words and reported errors.
 
 extern crate std;
 
@@ -38,8 +37,7 @@ pub(crate) fn start(flash: &mut FlashModel) -> Records<&mut FlashModel> {
     Records::start(flash, Choice::Newest, SERIAL).0
 }
 
-/// A flash with these blobs, each stored after the one before; of two plain ones the second is in
-/// slot 1.
+/// A flash with these blobs: first the plain blobs of a probe, in slots 0 and 1, then the stored blobs.
 fn holding(plain: &[usize], stored: &[usize]) -> FlashModel {
     let mut flash = FlashModel::erased();
     for (slot, number) in (0..).zip(plain) {
@@ -122,7 +120,7 @@ fn cut_everywhere(scenario: &Scenario) -> usize {
     whole.power_on();
     assert!(run(&mut whole));
     let (operations, mut cuts, mut confirmations) = (whole.operations, 0, 0);
-    // The last one comes after the end was confirmed: what is cut is the next start.
+    // The last operation comes after the confirmation: the cut hits the next start.
     for operation in 0..=operations {
         for cut in Cut::ALL {
             // Chance plays a part inside only.
@@ -196,7 +194,6 @@ fn a_word_that_does_not_hold_costs_no_blob_that_was_there() {
         let mut flash = sound.clone();
         flash.stuck = Some(word);
         let written = update(&mut flash, &blob(3)).is_ok();
-        // Of the slot of the older one, what is stuck as it was.
         let expected = blob(if written { 3 } else { 2 });
         assert_eq!(found(&mut flash), Some(crc(&expected)), "{word}");
     }

@@ -6,7 +6,7 @@ use stm32f4xx_hal::pac::TIM2;
 
 /// The alarm of ticks.
 pub const TICK: u8 = 0;
-/// The alarm at which the converter has settled.
+/// The alarm when the converter has settled.
 pub const SETTLED: u8 = 1;
 
 /// The clock.
@@ -44,7 +44,7 @@ impl Clock {
     /// Sets off alarm `N`, [`TICK`] or [`SETTLED`], at `due_us`; at once, if that is past.
     pub fn set_alarm<const N: u8>(&mut self, due_us: u32) {
         self.timer.ccr(N.into()).write(|w| w.ccr().set(due_us));
-        // A match with the register's value before is no alarm. Writing 1 leaves a flag as it is.
+        // A match with the register's earlier value is no alarm. Writing 1 does not change a flag.
         self.timer
             .sr()
             .write(|w| w.cc1if().bit(N != TICK).cc2if().bit(N != SETTLED));
@@ -59,7 +59,7 @@ impl Clock {
         let (flags, armed) = (self.timer.sr().read(), self.timer.dier().read());
         let tick = flags.cc1if().bit_is_set() && armed.cc1ie().bit_is_set();
         let settled = flags.cc2if().bit_is_set() && armed.cc2ie().bit_is_set();
-        // Writing 1 leaves a flag as it is.
+        // Writing 1 does not change a flag.
         self.timer
             .sr()
             .write(|w| w.cc1if().bit(!tick).cc2if().bit(!settled));

@@ -1,6 +1,6 @@
 //! The independent watchdog. It has an oscillator of its own and, once started, stops only with
-//! the power. (The HAL writes its period before it starts the oscillator and does not wait until
-//! the period is taken over: the first one would be 16 s.)
+//! the power. (The HAL writes the period before it starts the oscillator and does not wait
+//! until it is taken over: the first period would be 16 s.)
 
 use crate::board::INTERNAL_MHZ;
 use crate::wait::Stopwatch;

@@ -107,7 +107,7 @@ impl Bench {
         machine
     }
 
-    /// A controller whose converter plays these rows.
+    /// A controller with a converter that plays these rows.
     pub fn machine_playing(&self, slots: [&[u8]; 2], rows: Vec<Row>) -> Machine {
         Machine::new(&self.library, &self.image, rows, slots)
     }

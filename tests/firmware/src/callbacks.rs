@@ -36,13 +36,13 @@ fn context<'c>(user: *mut c_void) -> &'c Context {
     unsafe { &*user.cast::<Context>() }
 }
 
-/// A read of so many bytes.
+/// A read of 1 to 4 bytes.
 pub extern "C" fn read(handle: Handle, offset: u64, bytes: c_uint, user: *mut c_void) -> u64 {
     let context = context(user);
     context.access(handle, |chip| chip.load(context.start + offset, bytes))
 }
 
-/// A write of so many bytes.
+/// A write of 1 to 4 bytes.
 pub extern "C" fn write(handle: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
     let context = context(user);
     context.access(handle, |chip| {

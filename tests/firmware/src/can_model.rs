@@ -21,7 +21,7 @@ pub enum BusState {
 const FRAME_NS: u64 = 125_000;
 /// Of one with an extended identifier: 20 bits more, and a few stuffed ones.
 const EXTENDED_FRAME_NS: u64 = 149_000;
-/// Eleven recessive bits: the controller takes part in the bus after so many.
+/// Time of eleven recessive bits: then the controller takes part in the bus.
 const JOIN_NS: u64 = 11_000;
 /// A controller that recovers is bus-off for 128 times eleven recessive bits.
 const RECOVERY_NS: u64 = 128 * JOIN_NS;
@@ -73,7 +73,7 @@ pub struct CanModel {
     interrupts: u32,
     /// ERRI.
     latched: bool,
-    /// The time up to which it has advanced.
+    /// Time of the last advance.
     advanced_ns: u64,
     /// Until when other nodes hold the bus with frames of higher priority.
     busy_until_ns: u64,
@@ -87,8 +87,8 @@ pub struct CanModel {
     overrun: bool,
     /// The bus; change it by [`Self::set_bus`].
     pub bus: BusState,
-    /// The controller's node: frames are given and kept here as those of the table. What has another
-    /// identifier or check is kept as it is.
+    /// The controller's node. Frames are given and kept here with the identifiers of the table. Foreign frames are kept
+    /// unchanged.
     pub node: NodeNumber,
     /// Frames since the last look.
     pub sent: Vec<Sent>,
@@ -195,7 +195,7 @@ impl CanModel {
         }
     }
 
-    /// A frame from another node, as it is on the bus.
+    /// A frame from another node.
     pub fn receive_frame(&mut self, frame: &BusFrame, length_code: u8) {
         let id = to_register(frame.id);
         let mut bytes = [0; 8];

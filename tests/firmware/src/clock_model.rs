@@ -20,7 +20,7 @@ pub enum Pll {
     Sound,
     /// The internal oscillator only: the crystal has a wrong frequency.
     NotToCrystal,
-    /// Nothing.
+    /// No source.
     Dead,
 }
 

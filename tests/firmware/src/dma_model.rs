@@ -68,7 +68,7 @@ impl Side {
     }
 }
 
-/// From the flags' first bit to those of each stream, in the register of four of them.
+/// Place of the flags of each stream in the register of four streams.
 const fn shift(stream: usize) -> usize {
     [0, 6, 16, 22, 32, 38, 48, 54][stream]
 }
@@ -93,7 +93,7 @@ impl Dma {
         }
     }
 
-    /// Writes a register. Those of a stream that is on are protected.
+    /// Writes a register. The registers of a running stream are protected.
     pub fn write(&mut self, offset: usize, value: u32) {
         match offset {
             0x8 => self.flags &= !u64::from(value),

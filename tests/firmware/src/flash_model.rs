@@ -1,6 +1,6 @@
-//! Flash of the STM32F405 where the program writes it: the registers of RM0090 section 3 before
-//! sectors 1 and 2, which are those of [`tests::flash_model`]. FLASH_CR opens by two keys. While the
-//! flash is busy the core stands, because the program lies in it.
+//! Flash of the STM32F405 where the program writes it: the registers of RM0090 section 3 before sectors 1 and 2 of
+//! [`tests::flash_model`]. FLASH_CR opens by two keys. While the flash is busy the core stands, because the program
+//! lies in it.
 
 use ::tests::flash_model::{Cut, FlashModel as Sectors};
 use firmware::store::Flash;
@@ -132,7 +132,7 @@ impl FlashModel {
         }
     }
 
-    /// Reads so many bytes, lowest first.
+    /// Reads 1 to 8 bytes, lowest first.
     pub fn read(&mut self, offset: usize, bytes: usize) -> u64 {
         let mut read = [0; 8];
         self.sectors.read(offset as u32, &mut read[..bytes]);

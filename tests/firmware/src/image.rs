@@ -16,7 +16,7 @@ pub const RAM_BYTES: usize = 128 << 10;
 
 /// A program.
 pub struct Image {
-    /// Flash as it is after flashing onto an erased chip.
+    /// Flash after flashing onto an erased chip.
     pub flash: Vec<u8>,
     /// Bytes of flash that the program takes: code, constants, initial values.
     pub text_bytes: usize,
@@ -75,12 +75,12 @@ impl Image {
         }
     }
 
-    /// Address of a symbol whose name contains `part`, without the Thumb bit.
+    /// Address of the symbol with `part` in its name, without the Thumb bit.
     pub fn address(&self, part: &str) -> u32 {
         self.range(part).expect(part).start
     }
 
-    /// Addresses of a function or static whose name contains `part`, without the Thumb bit.
+    /// Addresses of the function or static with `part` in its name, without the Thumb bit.
     pub fn range(&self, part: &str) -> Option<Range<u32>> {
         let exact = self.symbols.iter().find(|(name, _)| name == part);
         let found = exact.or_else(|| self.symbols.iter().find(|(name, _)| name.contains(part)));

@@ -17,13 +17,13 @@ use tests::flash_model::Words;
 
 /// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
-/// What unused RAM is filled with.
+/// Content of unused RAM.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
 /// Its number in the vector table.
 const NMI: u32 = 2;
 
-/// What RAM holds after power-on.
+/// Content of RAM after power-on.
 fn fill_with_noise(ram: &mut [u8]) {
     let mut words = Words(1);
     ram.fill_with(|| words.draw() as u8);
@@ -48,7 +48,7 @@ pub struct Machine {
     pub panics: u32,
     /// Times the power was lost in an operation of the flash.
     pub power_cuts: u32,
-    /// Time by which the next tick's interrupt is held back, ns.
+    /// Delay of the next tick's interrupt, ns.
     pub hold_ns: u64,
     /// Whether a handler of faults left registers of the FPU to be stacked late, where the stack had
     /// been (LSPACT; ARM DDI 0403, B1.5.7).
@@ -167,7 +167,7 @@ impl Machine {
         true
     }
 
-    /// Runs for so many ns. The start-up after power-on comes on top.
+    /// Runs for `ns`. The start-up after power-on comes on top.
     pub fn run_ns(&mut self, ns: u64) {
         if !self.started {
             self.started = true;
@@ -211,7 +211,7 @@ impl Machine {
         }
     }
 
-    /// Runs for so many ticks of 2 ms.
+    /// Runs for `ticks` of 2 ms.
     pub fn run_ticks(&mut self, ticks: u64) {
         self.run_ns(ticks * 2_000_000);
     }
@@ -253,7 +253,7 @@ impl Machine {
         stack.len() - untouched
     }
 
-    /// Bytes of flash, to see that the program leaves the rest of them alone.
+    /// Bytes of flash outside the parameter sectors.
     pub fn flash(&self) -> &[u8] {
         &self.flash.0
     }

@@ -1,6 +1,5 @@
-//! The peripherals of an STM32F405 that the program uses. Time is that of the bench:
-//! it passes between interrupts and while bytes cross the SPI; instructions take time where they are
-//! counted, and else none.
+//! The peripherals of an STM32F405 that the program uses. Time passes between interrupts and while bytes cross the
+//! SPI; instructions take time only where they are counted.
 
 mod registers;
 
@@ -63,7 +62,7 @@ struct Alarm {
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
-    /// Time of one byte on the SPI in place of what its registers say, ns.
+    /// Time of one byte on the SPI, ns, in place of the time by its registers.
     pub spi_byte_ns: Option<u64>,
     /// Bytes that went over the SPI.
     pub spi_bytes: u64,
@@ -109,7 +108,7 @@ pub struct Peripherals {
     pub injects_again: bool,
     /// Instructions executed, where they are counted.
     pub instructions: u64,
-    /// Those of them whose time has passed.
+    /// Instructions after their time has passed.
     pub instructions_timed: u64,
     /// Instructions at the last filling of a mailbox.
     pub instructions_at_mailbox: u64,
@@ -179,8 +178,7 @@ impl Peripherals {
         new
     }
 
-    /// Resets everything on the chip; `flags` tell why in RCC_CSR. Time, the converter and
-    /// the stage go on.
+    /// Resets the chip; `flags` of RCC_CSR are the cause. Time, converter and stage go on.
     pub fn reset(&mut self, flags: u32) {
         self.words = vec![0; RANGE.1 as usize / 4];
         self.core_words = vec![0; CORE.1 as usize / 4];
@@ -285,7 +283,7 @@ impl Peripherals {
         }
     }
 
-    /// Whether a tick's alarm (the first one) is what is pending.
+    /// Whether the alarm of ticks, the first alarm, is pending.
     pub fn tick_is_due(&self) -> bool {
         self.timer_flags & 2 != 0
     }

@@ -101,8 +101,7 @@ unsafe fn function<F: Copy>(library: &Library, name: &[u8]) -> F {
 impl Unicorn {
     /// A Cortex-M4 with FPU, from the library at `path`.
     pub fn open(path: &OsStr) -> Self {
-        // SAFETY: the library and its functions are those of Unicorn 2.1, whose declarations
-        // in `unicorn.h` the types above repeat.
+        // SAFETY: the library is Unicorn 2.1, and the types above repeat the declarations of its `unicorn.h`.
         unsafe {
             let library = Library::new(path).expect("the emulator's library");
             let open: Open = function(&library, b"uc_open");

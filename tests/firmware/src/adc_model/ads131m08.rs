@@ -1,6 +1,5 @@
 //! TI ADS131M08 (SBAS950) with CLKIN 8 MHz: modulators at 4 MHz, sinc3 filters, a store of two
-//! conversions, frames of ten words of 24 bits. Where the sheet leaves open what silicon does,
-//! there is a [`Variant`].
+//! conversions, frames of ten words of 24 bits. A [`Variant`] decides where the sheet is silent.
 //!
 //! Not modelled: word lengths other than 24 bits, oversampling above 1024, phases, gains, offsets,
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
@@ -36,7 +35,7 @@ const REG_CRC_EN: u16 = 1 << 13;
 
 /// The part.
 pub struct Ads131m08 {
-    /// What silicon does where the sheet is silent.
+    /// The behaviour where the sheet is silent.
     pub variant: Variant,
     registers: [u16; 64],
     ready_ns: u64,
@@ -54,7 +53,7 @@ pub struct Ads131m08 {
     map_flag: bool,
     map_crc: u16,
     map_changed_ns: Option<u64>,
-    /// What the next frame says; `None` for the status.
+    /// The response of the next frame; `None`: the status.
     response: Option<u16>,
     listens: bool,
     received: Vec<u8>,
@@ -163,11 +162,11 @@ impl Ads131m08 {
         self.from_ns + (self.conversions + 1) * self.osr() * T_MOD_NS
     }
 
-    /// Stores what was converted by now.
+    /// Stores the conversions until now.
     fn advance(&mut self, now_ns: u64) {
         let ended = now_ns.saturating_sub(self.from_ns) / (self.osr() * T_MOD_NS);
         if self.clocked && self.store.len() == 2 && self.conversions >= 3 {
-            // Of all that a full store is offered it keeps one of the last two at most.
+            // A full store keeps at most one of the last two conversions.
             self.conversions = self.conversions.max(ended.saturating_sub(2));
         }
         while self.clocked && self.next_end_ns() <= now_ns {

@@ -1,4 +1,4 @@
-//! The checks: one property each. A check whose property does not hold panics.
+//! The checks: one property each. A check panics if its property does not hold.
 
 mod asking;
 pub mod authority;

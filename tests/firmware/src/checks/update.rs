@@ -22,7 +22,7 @@ const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
-/// Limits of the time of an update and of its erase, in which no frame is sent, s.
+/// Limits of the time of an update, and of its erase without frames, s.
 const UPDATE_S_MAX: f64 = 1.5;
 const STALL_S: std::ops::Range<f64> = 0.5..0.55;
 
@@ -117,8 +117,8 @@ pub(super) fn running(machine: &mut Machine) -> Vec<u8> {
     read.expect("a blob").1
 }
 
-/// An update: in time, poses invalid meanwhile, and the state "updating" sent before the erase, in which the
-/// ticks stand and the watchdog does not reset. The next power-on runs the new blob; activation runs it at
+/// An update: in time, poses invalid meanwhile, and the state "updating" sent before the erase. The ticks stand during
+/// the erase and the watchdog does not reset. The next power-on runs the new blob; activation runs it at
 /// once. The words are the host's words with the field model.
 pub fn new_parameters(bench: &Bench) {
     let mut machine = bench.running(100);

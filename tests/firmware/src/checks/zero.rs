@@ -29,7 +29,7 @@ fn expect_zero(seen: &Seen, is_set: bool) {
     assert_eq!(seen.flags() & flag::ZERO_SET != 0, is_set);
 }
 
-/// A controller whose stage was re-zeroed at rest.
+/// A controller after a re-zero at rest.
 fn re_zeroed(bench: &Bench) -> Machine {
     let rows = rows_at_rest([100, -50, 70, 10, 20, -30]);
     let mut machine = bench.machine_playing([&bench.blob, &[]], rows);

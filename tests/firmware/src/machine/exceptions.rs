@@ -109,8 +109,8 @@ impl Machine {
         saved
     }
 
-    /// Runs until `until` or until the chip is reset. An access to what is not there or is protected
-    /// leads into the handler of hard faults.
+    /// Runs until `until` or until the chip is reset. An access to missing or protected memory leads into the handler of
+    /// hard faults.
     pub(super) fn go(&mut self, from: u32, until: u32) {
         let mut ran = self.core.run(from, until);
         let protected = std::mem::take(&mut self.chip.memory_fault);

@@ -1,4 +1,4 @@
-//! Registers: what a read gives, and what a write does.
+//! Reads and writes of registers.
 
 use super::{
     Alarm, BELOW_RAM, BIT_BAND, CORE, Dma, Peripherals, RANDOM, RANDOM_FIRST, RANGE, Request,
@@ -29,10 +29,10 @@ const SPI_REQUESTS: u32 = 0b11;
 const LOOK_NS: u64 = 24;
 /// Time of 21 instructions of two cycles, ns.
 const OF_21_INSTRUCTIONS_NS: u64 = 250;
-/// The core's system timer, and the register by which a program resets it.
+/// The core's system timer, and the register of a reset by the program.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
-/// Registers in which only a 1 does something.
+/// Registers that ignore zeros.
 const INTERRUPT_ENABLES: std::ops::Range<usize> = 0xe100..0xe120;
 /// Memory protection: control, base and attributes of the region that was written last.
 pub(super) const MPU_CTRL: usize = 0xed94;
@@ -112,7 +112,7 @@ impl Peripherals {
             return;
         };
         self.now_ns = self.now_ns.max(end_ns);
-        // Both converters need mode 1: in another one bits are shifted.
+        // The converter needs mode 1: in another mode bits are shifted.
         let mode_1 = self.words[SPI1 / 4] & 3 == 1;
         let count = from.count.min(into.count);
         for k in 0..count {
@@ -292,7 +292,7 @@ impl Peripherals {
         self.alarms[k] = Alarm { at_ns };
     }
 
-    /// The bit of an input, by its resistor on the board and the one inside.
+    /// The bit of an input, by its resistors on the board and inside.
     fn level(&self, port: usize, pin: u32, pulled_up: bool) -> u32 {
         let inside = self.words[(port + 0x0c) / 4] >> (2 * pin) & 3;
         u32::from(pulled_up || inside == 1) << pin

@@ -1,33 +1,33 @@
-//! What the sheet of the ADS131M08 leaves open.
+//! Behaviour of the ADS131M08 where its sheet is silent.
 
 use super::INITIAL_WAIT;
 
-/// What the store does with a third conversion.
+/// The conversion that a full store loses when a third one ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Store {
-    /// It is lost.
+    /// The third.
     KeepsOldest,
-    /// The first one is lost.
+    /// The first.
     KeepsNewest,
-    /// The second one is lost.
+    /// The second.
     ReplacesLast,
 }
 
-/// What the data sheet leaves open.
+/// A behaviour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
-    /// What a full store does.
+    /// The loss of a full store.
     pub store: Store,
-    /// A conversion leaves the store when its frame ends, and not when it begins.
+    /// A conversion is removed when its frame ends, not when it begins.
     pub late_pop: bool,
-    /// Conversions that are not settled are held back.
+    /// Unsettled conversions are held back.
     pub gated: bool,
     /// From a resynchronisation until the filters take data, in periods of the modulators.
     pub wait: u64,
 }
 
 impl Variant {
-    /// What the text of the sheet says most plainly.
+    /// The plainest reading of the sheet.
     pub const PLAIN: Self = Self {
         store: Store::KeepsOldest,
         late_pop: false,
@@ -35,7 +35,7 @@ impl Variant {
         wait: 44,
     };
 
-    /// All that are plausible: 44 is the offset in table 8-3 and equation 9, 300 the wait after
+    /// All plausible behaviours: 44 is the offset in table 8-3 and equation 9, 300 the wait after
     /// a reset.
     pub fn all() -> impl Iterator<Item = Self> {
         let stores = [Store::KeepsOldest, Store::KeepsNewest, Store::ReplacesLast];

@@ -72,7 +72,7 @@ impl Case {
         }
     }
 
-    /// An event whose lost setting the part reports: it is started in the next tick.
+    /// An event that loses a setting: the part reports it and is started in the next tick.
     fn lost_setting(name: &str, event: Event) -> Self {
         Self {
             event,
