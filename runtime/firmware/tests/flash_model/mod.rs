@@ -80,7 +80,7 @@ struct Weak {
     eighths: u32,
 }
 
-/// Two sectors of flash. Two models are equal if they read the same.
+/// Two sectors of flash.
 #[derive(Clone, Debug)]
 pub struct FlashModel {
     bytes: Vec<u8>,
@@ -273,12 +273,6 @@ impl Flash for &mut FlashModel {
     }
 }
 
-impl PartialEq for FlashModel {
-    fn eq(&self, other: &Self) -> bool {
-        self.bytes == other.bytes
-    }
-}
-
 #[test]
 fn a_cut_leaves_bits_between_and_lets_nothing_follow() {
     let wrote = 0x00ff_f00f_u32;
@@ -299,37 +293,10 @@ fn a_cut_leaves_bits_between_and_lets_nothing_follow() {
         flash.power_on();
         seen[2] |= flash.word(1) != torn;
         assert!(flash.unstable || flash.word(1) == torn);
-        // Programmed again, it is as it should be, for good.
+        // Programmed again it reads right, for good.
         assert_eq!(flash.program(4, wrote.to_le_bytes()), Ok(()));
         flash.power_on();
         assert_eq!(flash.word(1), wrote);
     }
     assert_eq!(seen, [true; 3]);
-}
-
-#[test]
-fn a_cut_erase_leaves_any_mixture_in_its_sector_only() {
-    let sector = SLOT_BYTES as usize;
-    let (mut risen, mut fallen, mut kept) = (0, 0, 0);
-    for seed in 0..64 {
-        let mut flash = FlashModel::erased();
-        flash.seed(seed);
-        flash.load(0, &[0x5a; SLOT_BYTES as usize]);
-        flash.load(1, &[0x33; SLOT_BYTES as usize]);
-        flash.cut_at(0, Cut::Inside);
-        assert_eq!(flash.erase(0), Err(OFF));
-        assert!(flash.bytes[sector..].iter().all(|&b| b == 0x33));
-        for &byte in &flash.bytes[..sector] {
-            risen += (byte & !0x5a).count_ones();
-            fallen += (!byte & 0x5a).count_ones();
-            kept += (!(byte ^ 0x5a)).count_ones();
-        }
-        let before = flash.clone();
-        flash.power_on();
-        assert_eq!(flash == before, !flash.unstable);
-        assert_eq!(flash.erase(0), Ok(()));
-        flash.power_on();
-        assert!(flash.bytes[..sector].iter().all(|&b| b == 0xff));
-    }
-    assert!(risen > 100_000 && fallen > 100_000 && kept > 100_000);
 }

@@ -98,17 +98,6 @@ mod tests {
     const ROWS: [Row; 2] = [[0; 6], [100, 200, -100, 0, 1, 2]];
 
     #[test]
-    fn held_rows_change_at_the_ticks() {
-        let mut input = Input::held(ROWS.to_vec());
-        assert_eq!(input.constant(0, 999), Some(ROWS[0]));
-        input.start(1000);
-        assert_eq!(input.constant(1000, 2_000_999), Some(ROWS[0]));
-        assert_eq!(input.constant(2_000_999, 2_001_000), None);
-        assert_eq!(input.constant(2_001_000, 4_000_999), Some(ROWS[1]));
-        assert_eq!(input.constant(4_001_000, 4_001_000), Some(ROWS[0]));
-    }
-
-    #[test]
     fn a_motion_is_linear_from_row_to_row_and_ends_with_the_last() {
         let mut input = Input::moving(ROWS.to_vec(), 2000, 1);
         input.start(0);
