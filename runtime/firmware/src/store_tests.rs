@@ -12,7 +12,7 @@ use runtime::parameters::Text;
 use std::vec::Vec;
 use std::{format, println};
 
-const SEEDS: u64 = 32;
+const SEEDS: u64 = 8;
 pub(crate) const SERIAL: Option<&str> = Some("HS-0007");
 
 /// A blob of the stage, in turn of both layouts and of another length.
