@@ -1,4 +1,4 @@
-//! The axes of the pose and the Hall probes, in the order of every array of them.
+//! The axes of the pose and the Hall probes, in the order of every array of them; units as people write them.
 
 /// An axis of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,3 +48,14 @@ pub const PLANAR: [Axis; 3] = [AXES[0], AXES[1], AXES[2]];
 
 /// Names of the Hall probes.
 pub const PROBES: [&str; 3] = ["A", "B", "C"];
+
+/// A unit as a sentence or a table shows it: `um` as µm.
+pub fn sign(unit: &str) -> &str {
+    match unit {
+        "um" => "µm",
+        "urad" => "µrad",
+        "us" => "µs",
+        "degC" => "°C",
+        unit => unit,
+    }
+}

@@ -122,7 +122,7 @@ impl Stage {
     fn tables(&self) -> Vec<Table> {
         let stage = &*self.designed;
         let mm = |m: f64| bare(m * 1e3, "mm");
-        let mut sensors = Table::new("stage", &["x, mm", "y, mm", "um per code", "codes"]);
+        let mut sensors = Table::new("stage", &["x, mm", "y, mm", "µm per code", "codes"]);
         let places = stage.places_m().into_iter().zip(PROBES);
         let hall = places.map(|(place, name)| (format!("Hall probe {name}"), place, &stage.hall));
         let places = stage.capacitive_probes_m.into_iter().zip(1..);

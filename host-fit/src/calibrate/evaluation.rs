@@ -11,6 +11,7 @@ use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::Known;
 use hallstage_calibration::words;
+use hallstage_input::axis::{PLANAR, sign};
 use hallstage_input::finding::Severity;
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
@@ -174,13 +175,12 @@ fn is_field(set: &ParameterSet) -> bool {
 /// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
 /// has none to compare with.
 fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
-    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
     let own = |axis: usize| f64::from(set.fit.rms[axis]);
     let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
     let worst = (0..3)
         .filter(|&axis| own(axis) > 0.0)
         .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-    let (axis, unit) = AXES[worst];
+    let (axis, unit) = (PLANAR[worst].name, sign(PLANAR[worst].micro));
     (ratio(worst) > limit).then(|| {
         let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
         format!(

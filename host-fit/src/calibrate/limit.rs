@@ -1,14 +1,8 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
+use hallstage_input::axis::{PLANAR, sign};
 use hallstage_input::log::layout::Kind;
 use std::str::FromStr;
-
-/// Name, unit in messages and kind of unit of an axis.
-const AXES: [(&str, &str, Kind); 3] = [
-    ("x", "um", Kind::Length),
-    ("y", "um", Kind::Length),
-    ("rz", "urad", Kind::Angle),
-];
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,11 +17,16 @@ impl FromStr for Limits {
             let wrong =
                 || format!("`{part}` is no limit: write for instance x=1.5um,y=1um,rz=4urad");
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;
-            let axis = AXES.iter().position(|(axis, ..)| *axis == name.trim());
+            let axis = PLANAR.iter().position(|axis| axis.key == name.trim());
             let axis = axis.ok_or_else(wrong)?;
             let is_digit = |c: char| c.is_ascii_digit() || c == '.';
             let (number, unit) = value.split_at(value.rfind(is_digit).map_or(0, |at| at + 1));
-            let si = AXES[axis].2.unit(unit).ok_or_else(wrong)?;
+            let kind = if PLANAR[axis].unit == "m" {
+                Kind::Length
+            } else {
+                Kind::Angle
+            };
+            let si = kind.unit(unit).ok_or_else(wrong)?;
             let number = number.trim().parse();
             let number: f64 = number.map_err(|_| wrong())?;
             if !(number.is_finite() && number > 0.0) {
@@ -47,7 +46,7 @@ impl Limits {
     pub fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
         let beyond = (0..3).filter_map(|axis| {
             let (limit, rms) = (self.0[axis]?, rms[axis]);
-            let (name, unit, _) = AXES[axis];
+            let (name, unit) = (PLANAR[axis].key, sign(PLANAR[axis].micro));
             (rms > limit).then(|| {
                 format!(
                     "{name} {:.3} {unit} rms, limit {:.3} {unit}",

@@ -174,7 +174,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         "Errors, rms and peak",
         [
             (
-                "Table 2: designed values, Model (15), Z = +-250 um",
+                "Table 2: designed values, Model (15), Z = ±250 µm",
                 designed,
             ),
             (paper_s, TABLE_2),

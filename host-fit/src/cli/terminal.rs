@@ -5,7 +5,7 @@
 
 use crate::cli::error::HostError;
 use crate::report::table::Table;
-use crate::report::text::{as_text, plain, with_signs};
+use crate::report::text::{as_text, plain};
 use anstyle::{AnsiColor, Style};
 use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};
@@ -40,7 +40,7 @@ pub(super) fn print(text: &str) -> Result<(), HostError> {
     if is_quiet() {
         return Ok(());
     }
-    let text = with_units(plain(text, "\n"));
+    let text = for_locale(plain(text, "\n"));
     if TAKEN.load(Ordering::Relaxed) {
         let _ = std::io::stderr().write_all(text.as_bytes());
         return Ok(());
@@ -54,8 +54,8 @@ pub(super) fn print(text: &str) -> Result<(), HostError> {
     }
 }
 
-/// Text with the signs of its units, where the terminal takes UTF-8.
-fn with_units(text: Cow<'_, str>) -> Cow<'_, str> {
+/// Text without µ, ° and ±, where the locale is not UTF-8.
+fn for_locale(text: Cow<'_, str>) -> Cow<'_, str> {
     let names = ["LC_ALL", "LC_CTYPE", "LANG"];
     let mut locales = names.into_iter().filter_map(std::env::var_os);
     let locale = locales
@@ -63,8 +63,12 @@ fn with_units(text: Cow<'_, str>) -> Cow<'_, str> {
         .unwrap_or_default();
     let locale = locale.to_string_lossy().to_lowercase();
     match locale.contains("utf-8") || locale.contains("utf8") {
-        true => Cow::Owned(with_signs(&text)),
-        false => Cow::Owned(text.replace('µ', "u").replace('°', "deg")),
+        true => text,
+        false => Cow::Owned(
+            text.replace('µ', "u")
+                .replace('°', "deg")
+                .replace('±', "+-"),
+        ),
     }
 }
 
@@ -120,6 +124,6 @@ pub(super) fn fail(error: &HostError) {
 fn line(start: &str, color: AnsiColor, text: impl Display) {
     let style = Style::new().bold().fg_color(Some(color.into()));
     let text = text.to_string();
-    let text = with_units(plain(&text, ""));
+    let text = for_locale(plain(&text, ""));
     let _ = writeln!(anstream::stderr(), "{style}{start}:{style:#} {text}");
 }

@@ -2,7 +2,6 @@
 //! width. A chart is a stack of panels over the same abscissa.
 
 use super::axis::{Axis, short};
-use super::text::with_signs;
 use serde::{Serialize, Serializer};
 use std::fmt::Write;
 
@@ -118,7 +117,7 @@ impl Chart {
                 top: top + MARGIN,
                 bottom: top + PANEL_HEIGHT - MARGIN,
             };
-            area.draw_axes(&mut svg, &with_signs(&panel.label));
+            area.draw_axes(&mut svg, &panel.label);
             panel
                 .marks
                 .iter()
@@ -141,7 +140,7 @@ impl Chart {
             &mut svg,
             format_args!(
                 "text-anchor=\"middle\" x=\"{middle}\" y=\"{below}\">{}",
-                with_signs(&self.x_label)
+                self.x_label
             ),
         );
         svg + "</svg>\n"

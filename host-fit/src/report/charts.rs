@@ -27,8 +27,8 @@ type Quantity = (&'static str, fn(&Row) -> f64);
 
 /// Temperatures, where the log has them.
 const TEMPERATURES: [Quantity; 2] = [
-    ("mount, degC", |row| celsius(row, 0)),
-    ("body, degC", |row| celsius(row, 1)),
+    ("mount, °C", |row| celsius(row, 0)),
+    ("body, °C", |row| celsius(row, 1)),
 ];
 
 fn celsius(row: &Row, sensor: usize) -> f64 {
@@ -40,15 +40,15 @@ fn celsius(row: &Row, sensor: usize) -> f64 {
 
 /// All else that a log holds, three quantities a chart.
 const QUANTITIES: [Quantity; 9] = [
-    ("X, um", |row| row.reference[0] * 1e6),
-    ("Y, um", |row| row.reference[1] * 1e6),
-    ("Rz, urad", |row| row.reference[2] * 1e6),
-    ("signal A, um", |row| row.signal_m[0] * 1e6),
-    ("signal B, um", |row| row.signal_m[1] * 1e6),
-    ("signal C, um", |row| row.signal_m[2] * 1e6),
-    ("Z, um", |row| row.vertical[0] * 1e6),
-    ("Rx, urad", |row| row.vertical[1] * 1e6),
-    ("Ry, urad", |row| row.vertical[2] * 1e6),
+    ("X, µm", |row| row.reference[0] * 1e6),
+    ("Y, µm", |row| row.reference[1] * 1e6),
+    ("Rz, µrad", |row| row.reference[2] * 1e6),
+    ("signal A, µm", |row| row.signal_m[0] * 1e6),
+    ("signal B, µm", |row| row.signal_m[1] * 1e6),
+    ("signal C, µm", |row| row.signal_m[2] * 1e6),
+    ("Z, µm", |row| row.vertical[0] * 1e6),
+    ("Rx, µrad", |row| row.vertical[1] * 1e6),
+    ("Ry, µrad", |row| row.vertical[2] * 1e6),
 ];
 
 /// The planar axes, as charts name them.

@@ -3,7 +3,6 @@
 
 use super::chart::Chart;
 use super::table::Table;
-use super::text::with_signs;
 use super::verdict::Summary;
 use hallstage_calibration::words::Worded;
 use hallstage_input::finding::{Code, Finding, Severity};
@@ -83,7 +82,6 @@ fn rendered(name: &str, template: &str, of: &impl Serialize) -> Result<String, E
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
     engine.add_global("style", include_str!("style.css"));
-    engine.add_filter("signs", |text: String| with_signs(&text));
     engine.add_template("cells.html", include_str!("cells.html"))?;
     engine.add_template("verdict.html", include_str!("verdict.html"))?;
     engine.add_template("findings.html", include_str!("findings.html"))?;

@@ -12,7 +12,7 @@ use super::text::file_name;
 use super::verdict::{Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::white_noise;
-use hallstage_input::axis::{AXES, Axis};
+use hallstage_input::axis::{AXES, Axis, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
@@ -107,7 +107,7 @@ impl Source<'_> {
             let c = &set.constants;
             let ends = [c.calibrated_planar, c.calibrated_vertical].concat();
             let range = |(axis, end): (&Axis, f32)| {
-                format!("{} ±{:.0} {}", axis.name, end * 1e6, axis.micro)
+                format!("{} ±{:.0} {}", axis.name, end * 1e6, sign(axis.micro))
             };
             let mut ranges: Vec<String> = AXES.iter().zip(ends).map(range).collect();
             ranges.push(match set.model {
@@ -143,7 +143,7 @@ impl Source<'_> {
             let [low, high] = self.dataset.temperature_range_mc(sensor, all.clone())?;
             let [low, high] = [low, high].map(|mc| f64::from(mc) * 1e-3);
             Some(format!(
-                "{} {low:.1} to {high:.1} degC",
+                "{} {low:.1} to {high:.1} °C",
                 ["mount", "body"][sensor]
             ))
         };

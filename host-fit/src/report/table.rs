@@ -2,6 +2,7 @@
 
 use super::figure::{Figure, Group, Item};
 use super::text::words;
+use hallstage_input::axis::sign;
 use serde::{Serialize, Serializer};
 
 /// A table of figures. The name of a row stands in its first column.
@@ -97,7 +98,7 @@ impl Table {
         if self.columns.is_empty() {
             let line = |(name, figures): &(String, Vec<Figure>)| {
                 let cell = |figure: &Figure| {
-                    format!("{} {}", text(figure), figure.unit().name)
+                    format!("{} {}", text(figure), sign(figure.unit().name))
                         .trim_end()
                         .to_owned()
                 };
@@ -115,7 +116,7 @@ impl Table {
         }
         let unit = |figures: &mut dyn Iterator<Item = &Figure>| -> Option<&'static str> {
             let mut units = figures
-                .map(|figure| figure.unit().name)
+                .map(|figure| sign(figure.unit().name))
                 .filter(|unit| !unit.is_empty());
             let first = units.next().unwrap_or_default();
             units.all(|unit| unit == first).then_some(first)
@@ -252,16 +253,16 @@ mod tests {
         let want = [
             "  rows     3",
             "  elapsed  1.25 s",
-            "  fitness  1.500 um",
-            "  lag      -3.00(50) us",
+            "  fitness  1.500 µm",
+            "  lag      -3.00(50) µs",
             "",
             "errors",
             "       rmse    peak  unit",
-            "  x   1.000  20.500  um",
-            "  rz  0.250   0.500  urad",
+            "  x   1.000  20.500  µm",
+            "  rz  0.250   0.500  µrad",
             "",
             "logs",
-            "  path   errors x rmse, um  errors rz rmse, urad",
+            "  path   errors x rmse, µm  errors rz rmse, µrad",
             "  a.csv              2.000                 3.000",
             "",
         ];

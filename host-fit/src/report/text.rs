@@ -2,6 +2,7 @@
 
 use super::figure::Figure;
 use super::table::Table;
+use hallstage_input::axis::sign;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -23,7 +24,7 @@ impl Figure {
                 let is_mixed = all.iter().any(|one| matches!(one, Self::Text(_)))
                     && all.iter().any(|one| matches!(one, Self::Number { .. }));
                 let with_unit = |one: &Self| {
-                    format!("{} {}", one.text(), one.unit().name)
+                    format!("{} {}", one.text(), sign(one.unit().name))
                         .trim_end()
                         .to_owned()
                 };
@@ -125,27 +126,6 @@ pub fn plain<'t>(text: &'t str, kept: &str) -> Cow<'t, str> {
     Cow::Owned(plain)
 }
 
-/// Text with µ in um, urad and us, where they follow a number or a comma, or stand alone.
-pub fn with_signs(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut before = "";
-    for word in text.split_inclusive([' ', '\n', '/', ',', ';', ':', ')', '(']) {
-        let bare = word.trim_end_matches([' ', '\n', '/', ',', ';', ':', ')', '.']);
-        let follows = before.ends_with([',', '(', '/'])
-            || before.ends_with(|c: char| c.is_ascii_digit())
-            || before.is_empty();
-        match bare {
-            "um" | "urad" | "us" if follows => {
-                out.push('µ');
-                out.push_str(&word[1..]);
-            }
-            _ => out.push_str(word),
-        }
-        before = word.trim_end_matches([' ', '\n']);
-    }
-    out
-}
-
 /// The name of a file without its folder.
 pub fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
@@ -156,22 +136,6 @@ pub fn file_name(path: &Path) -> String {
 mod tests {
     use super::*;
     use crate::report::figure::{bare, figure};
-
-    #[test]
-    fn units_have_their_signs_beside_a_number_and_nowhere_else() {
-        for (plain, want) in [
-            ("um", "µm"),
-            ("X rms, um", "X rms, µm"),
-            (
-                "1.2 um, 3 urad (4 us); 5 um/s",
-                "1.2 µm, 3 µrad (4 µs); 5 µm/s",
-            ),
-            ("2 um: more\n  3 um\n", "2 µm: more\n  3 µm\n"),
-            ("`X [um]` is t_us, ask us", "`X [um]` is t_us, ask us"),
-        ] {
-            assert_eq!(with_signs(plain), want);
-        }
-    }
 
     #[test]
     fn numbers_have_the_digits_of_their_unit_and_of_their_standard_error() {

@@ -133,7 +133,7 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
                 false => format!("{high:.1}"),
             };
             format!(
-                "for movements like those of the log; in service expect {} um in X, {} um in Y, {} urad in Rz",
+                "for movements like those of the log; in service expect {} µm in X, {} µm in Y, {} µrad in Rz",
                 range(x),
                 range(y),
                 range(rz)
@@ -266,7 +266,7 @@ mod tests {
                 true,
                 ["limited", "1.20", "for mains"],
             ),
-            (End::Written, limited, false, ["limited", "um in X", "plan"]),
+            (End::Written, limited, false, ["limited", "µm in X", "plan"]),
             (End::Written, refused, true, ["refused", "1.20", "fit eval"]),
             (failed, good, true, ["refused", "no motion", ""]),
             (End::Interrupted, good, true, ["limited", "1.20", ""]),
@@ -293,9 +293,9 @@ mod tests {
                 .join(" ")
         };
         // rms, noise, in service, k = 2, limit.
-        assert_eq!(row("  X "), "1.00 1.00 1.20 2.40 1.30 yes um");
-        assert_eq!(row("  Y "), "1.00 0.50 0.50 1.00 0.90 no um");
-        assert_eq!(row("  Rz"), "1.00 2.40 2.40 4.80 3.12 yes urad");
+        assert_eq!(row("  X "), "1.00 1.00 1.20 2.40 1.30 yes µm");
+        assert_eq!(row("  Y "), "1.00 0.50 0.50 1.00 0.90 no µm");
+        assert_eq!(row("  Rz"), "1.00 2.40 2.40 4.80 3.12 yes µrad");
         assert!(text.ends_with("next: judge it on another log with host-fit eval\n"));
     }
 }
