@@ -1,11 +1,12 @@
 //! Why an output is not written.
 
+use super::is_standard;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// An output that was not written. The target is as it was before.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
+#[error("{}: {problem}", if is_standard(path) { "standard output".into() } else { path.to_string_lossy() })]
 pub struct OutputError {
     /// The output as the user named it.
     pub path: PathBuf,
@@ -21,10 +22,10 @@ pub enum OutputProblem {
     #[error("the name of the output is empty; name a file")]
     NoName,
     /// An input of the same command.
-    #[error("is an input of this command; name another file")]
+    #[error("also an input of this command; name another file")]
     IsInput,
     /// Named twice.
-    #[error("is another output of this command; name another file")]
+    #[error("also another output of this command; name another file")]
     IsOutput,
     /// The target is a folder.
     #[error("is a folder; name a file in it")]

@@ -134,7 +134,6 @@ pub fn file_name(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::report::figure::{bare, figure};
 
     #[test]

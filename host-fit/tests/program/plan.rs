@@ -44,7 +44,7 @@ fn what_cannot_be_planned_leaves_no_file() {
     bench.bad(
         "plan --seconds 20 --out - --json -",
         2,
-        &["standard output is another output"],
+        &["standard output: also another output"],
     );
     bench.bad("plan --seconds 20 --out stage.toml", 2, &["is an input"]);
     bench.write(

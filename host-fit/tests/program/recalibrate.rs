@@ -191,7 +191,7 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         &["old.bin.posterior does not exist", "--what gains"],
     );
     let arguments = "recalibrate old.bin sine.csv --what gain --out old.bin";
-    bench.bad(arguments, 2, &["old.bin is an input"]);
+    bench.bad(arguments, 2, &["old.bin: also an input"]);
     bench.write("old.bin.posterior", &posterior);
     for command in [
         "diff old.bin old.bin --json old.bin.posterior",

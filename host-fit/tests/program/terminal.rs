@@ -45,7 +45,7 @@ fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
     bench.bad(
         &format!("{fit} - --json -"),
         2,
-        &["standard output is another output"],
+        &["standard output: also another output"],
     );
     let json = bench.good(&format!("{fit} q.bin --json -"));
     assert!(serde_json::from_slice::<serde_json::Value>(&json.stdout).is_ok());
