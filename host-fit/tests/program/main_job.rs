@@ -178,7 +178,7 @@ fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none
         let named = warnings
             .iter()
             .filter_map(Value::as_str)
-            .filter(|warning| warning.contains("the draw of rows misses"));
+            .filter(|warning| warning.contains("The draw has no row of"));
         assert_eq!(named.count(), missed, "{draw}: {warnings:?}");
     }
 }

@@ -324,7 +324,7 @@ fn evidence(found: &Finding) -> (String, String) {
             ..
         } => (
             format!(
-                "{parameter} stands at an end of its search range or beyond ({value:.6} {unit})"
+                "parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})"
             ),
             "check the scales and signs of that probe and of the beams; if they are right, widen the range in stage.toml",
         ),
