@@ -74,12 +74,13 @@ fn main() -> Fallible<()> {
 fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
     let mut rows =
         String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
-    for group in &problem.groups {
-        for row in &problem.rows[group.rows.clone()] {
+    for (number, movement) in problem.rows.numbered_movements() {
+        for row in &problem.rows.rows[movement] {
             let [z, rx, ry] = row.vertical;
-            let numbers = [row.signal_um, [z, rx, ry], row.reference_um].concat();
+            let um = |mm: [f64; 3]| mm.map(|mm| mm * 1e3);
+            let numbers = [um(row.signal_mm), [z, rx, ry], um(row.reference_mm)].concat();
             let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
-            writeln!(rows, "{},{}", group.movement, text.join(","))?;
+            writeln!(rows, "{},{}", number, text.join(","))?;
         }
     }
     std::fs::write(folder.join("rows.csv"), rows)?;

@@ -7,8 +7,3 @@ pub mod judge;
 pub mod plan;
 pub mod recalibrate;
 pub mod words;
-#[cfg(test)]
-use hallstage_solver::problem;
-#[cfg(test)]
-#[path = "../../solver/src/problem/synthetic_for_tests.rs"]
-mod synthetic;

@@ -11,7 +11,6 @@ use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
 use super::mistakes::{Change, Mistake, cause, mistakes};
 use super::range::SPANS;
 use crate::judge::identify::check_motion;
-use crate::judge::lag::ALIKE_S;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -22,6 +21,9 @@ use hallstage_solver::solve::field::parameters::FALL_PER_M;
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
 
+/// For how long a model errs alike, s: its errors go with the motion. What it leaves unexplained
+/// counts as one residual in that time.
+const ALIKE_S: f64 = 0.5;
 /// Gain and its slopes, how far height and tilts carry the probe, and what lags of the beams do.
 const UNKNOWNS: usize = 12;
 

@@ -3,7 +3,6 @@
 
 use super::job::{Job, check_near};
 use super::{Estimate, Fit, FitError, FittedRows};
-use crate::judge::lag::ReferenceLag;
 use hallstage_solver::problem::Problem;
 use hallstage_solver::problem::model::Model;
 use hallstage_solver::solve::Solver;
@@ -11,6 +10,7 @@ use hallstage_solver::solve::field::error::FieldFitError;
 use hallstage_solver::solve::field::fit::WhiteFit;
 use hallstage_solver::solve::robust::{self, Loss};
 use runtime::ModelKind;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The field model under white noise, on which every robust fit rests: its residuals are noise
@@ -27,18 +27,19 @@ impl Job<'_> {
         let fitted = || {
             let started = Instant::now();
             let (rows, settings) = (&self.selected, self.settings);
-            let problem =
-                || Problem::new(self.dataset, rows, self.stage, Model::of(ModelKind::M31));
-            let least_squares = Solver::LeastSquares.solve(&problem(), &settings.options);
+            let model = Model::of(ModelKind::M31);
+            let problem = Problem::new(self.dataset, rows, self.stage, model);
+            let least_squares = Solver::LeastSquares.solve(&problem, &settings.options);
             let found = least_squares.map_err(FitError::from).and_then(|start| {
-                let field = WhiteFit::new(self.dataset, rows, self.stage, &start.parameters)?;
+                let (rows, from) = (Arc::clone(&problem.rows), &start.parameters);
+                let field = WhiteFit::new(self.dataset, rows, self.stage, from)?;
                 Ok((start, field))
             });
             let (start, field) = match (found, settings.loss) {
                 (found, Loss::None) => found?,
                 (Ok((start, field)), loss) if !field.has_outliers(loss) => (start, field),
                 (_, loss) => {
-                    let start = robust::start(&problem())?;
+                    let start = robust::start(&problem)?;
                     let (from, stage) = (&start.parameters, self.stage);
                     let field = WhiteFit::robust(self.dataset, rows, stage, from, loss)?;
                     (start, field)
@@ -70,12 +71,8 @@ impl Job<'_> {
             Model::of(ModelKind::M31),
             &found.parameters.model_31(),
         )?;
-        let lag = |standard_error_s| ReferenceLag {
-            value_s: found.lag_s,
-            standard_error_s,
-        };
         let estimate = Estimate {
-            lag: found.posterior.lag_error_s.map(lag),
+            lag: found.lag,
             parameters: found.parameters,
             temperature: found.figures.warmth.temperature,
             posterior: found.posterior,

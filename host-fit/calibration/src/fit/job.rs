@@ -4,8 +4,6 @@ use super::calibration::reach;
 use super::field::FirstPhase;
 use super::{Estimate, Fit, FitError, FitSettings, FittedRows, ModelChoice};
 use crate::judge::identify::{check_described, check_determined, check_motion};
-use crate::judge::lag::reference_lag;
-use crate::judge::uncertainty::uncertainty;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::Problem;
@@ -15,6 +13,7 @@ use hallstage_solver::problem::parameters::{Parameters, SLOPES, search_box};
 use hallstage_solver::solve::field::blocks::Rows;
 use hallstage_solver::solve::field::error::FieldFitError;
 use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::sandwich::Sandwich;
 use hallstage_solver::solve::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver};
 use runtime::ModelKind;
@@ -127,8 +126,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// The rows used as the field model sees them: those of its first phase where the weights are the same.
-    fn field_rows(&self, fitted: &FittedRows) -> Arc<Rows> {
+    /// The rows that count: those of the first phase where the weights are the same.
+    fn rows(&self, fitted: &FittedRows) -> Arc<Rows> {
         match self.first.get() {
             Some(Ok(first)) if first.field.weights == fitted.weights => {
                 Arc::clone(first.field.rows())
@@ -146,32 +145,33 @@ impl<'a> Job<'a> {
         let (dataset, stage, settings) = (self.dataset, self.stage, self.settings);
         let solver = settings.solver;
         let fitted = self.fitted_rows();
-        let (used, weights): (Vec<usize>, Vec<f64>) = fitted.counted().unzip();
-        let mut problem = Problem::new(dataset, &used, stage, model);
-        for (row, weight) in problem.rows.iter_mut().zip(weights) {
-            row.weight = weight;
-        }
+        let problem = Problem {
+            stage,
+            model,
+            rows: self.rows(&fitted),
+        };
         let solution = solver.solve(&problem, &settings.options)?;
         let parameters = solution.parameters;
         let at_pole = FitError::AtPole {
             solver: solver.name(),
         };
-        let uncertainty = uncertainty(&problem, &parameters).ok_or(at_pole)?;
+        let sandwich = Sandwich::new(&problem, &parameters).ok_or(at_pole)?;
         let (_, vertical) = reach(fitted.sound(dataset));
-        let determined = check_determined(stage, model, &parameters, &uncertainty, vertical);
+        let determined = check_determined(stage, model, &parameters, &sandwich, vertical);
         // A lag shows at the best description of the log, which a search may be far from.
-        let best = match solver {
-            Solver::Search(_) => Solver::LeastSquares.solve(&problem, &settings.options).ok(),
-            Solver::Finished | Solver::LeastSquares => None,
+        let lag = match solver {
+            Solver::Search(_) => {
+                let best = Solver::LeastSquares.solve(&problem, &settings.options).ok();
+                let at_best = best.and_then(|best| Sandwich::new(&problem, &best.parameters));
+                at_best.and_then(|at_best| at_best.lag)
+            }
+            Solver::Finished | Solver::LeastSquares => sandwich.lag,
         };
-        // Room for what the lag takes.
-        drop(problem);
-        let best = best.map_or(parameters, |best| best.parameters);
         let estimate = Estimate {
-            lag: reference_lag(&self.field_rows(&fitted), stage, model, &best),
+            lag,
             parameters: FieldParameters::of_model_31(&parameters, stage),
             temperature: dataset.temperature,
-            posterior: uncertainty.posterior(&parameters, stage),
+            posterior: sandwich.posterior,
             delta_m: Some(solution.delta_m),
             evaluations: solution.evaluations,
             elapsed: solution.elapsed,

@@ -2,7 +2,6 @@
 
 use super::Fit;
 use crate::judge::Judgement;
-use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::AxisError;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
@@ -10,7 +9,8 @@ use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::terms::shown;
 use hallstage_solver::problem::zero_deviation::ZeroDeviation;
-use hallstage_solver::solve::least_squares::solve::at_limit;
+use hallstage_solver::solve::field::least_squares::at_limit;
+use hallstage_solver::solve::field::sandwich::ReferenceLag;
 
 /// Warn of a lag from this part of a servo period on, ...
 const LAG_MIN: f64 = 0.1;

@@ -1,13 +1,13 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
 use crate::judge::statistics::PoseError;
-use crate::judge::uncertainty::Uncertainty;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::problem::model::{GAIN_TERMS, Model, ParameterId};
 use hallstage_solver::problem::parameters::{Parameters, THETA, search_box};
 use hallstage_solver::problem::terms::Motion;
+use hallstage_solver::solve::field::sandwich::Sandwich;
 use nalgebra::Vector3;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a
@@ -223,7 +223,7 @@ pub fn check_determined(
     stage: &Stage,
     model: &'static Model,
     parameters: &Parameters,
-    uncertainty: &Uncertainty,
+    uncertainty: &Sandwich,
     vertical_span: [f64; 3],
 ) -> Result<(), FitFailure> {
     let misalignment_rad = parameters.geometry().misalignment_rad;

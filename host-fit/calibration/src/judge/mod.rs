@@ -19,13 +19,11 @@
 
 pub mod identify;
 mod judgement;
-pub mod lag;
 pub mod left_out;
 pub mod precision;
 pub mod predicted;
 pub mod spectrum;
 pub mod statistics;
-pub mod uncertainty;
 pub mod verdict;
 
 pub use judgement::{Judge, Judgement, LogJudgement};

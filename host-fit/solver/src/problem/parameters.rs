@@ -46,6 +46,15 @@ impl Parameters {
         Self::new(geometry, sensitivity.map(|s| s.eta), slopes)
     }
 
+    /// Of values in the order of the list.
+    pub fn from_slice(slice: &[f64]) -> Self {
+        let mut values = [0.0; COUNT];
+        for (value, x) in values.iter_mut().zip(slice) {
+            *value = *x;
+        }
+        Self { values }
+    }
+
     /// Three neighbours of the list: those of A, B, C.
     const fn three(&self, start: usize) -> [f64; 3] {
         let v = &self.values;

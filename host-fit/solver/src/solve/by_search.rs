@@ -4,7 +4,7 @@
 //! from each movement, until it hardly improves; what it found is then a start of the
 //! least-squares fit on all rows. So the result is the least-squares optimum whatever the seed, and the search guards against a start that leads nowhere.
 
-use super::least_squares::solve as least_squares;
+use super::field::least_squares;
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
@@ -135,7 +135,7 @@ pub fn solution_of(
             best
         }),
         parameters,
-        cost: found.cost * found.cost * 3.0 * problem.rows.len() as f64,
+        cost: found.cost * found.cost * 3.0 * problem.rows.rows.len() as f64,
         evaluations: found.evaluations as u64,
         history: found.history.clone(),
         elapsed: std::time::Duration::ZERO,

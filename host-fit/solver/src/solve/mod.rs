@@ -3,8 +3,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`gauss_newton`] | the one estimator: damped Gauss-Newton with a prior |
-//! | [`least_squares`] | the models of the paper by it |
-//! | [`field`] | the field model by it |
+//! | [`field`] | the models by it |
 //! | [`objective`] | the fitness as a cost function of a search |
 //! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
 //! | [`robust`] | rows that the model does not explain count less |
@@ -34,7 +33,6 @@
 pub mod by_search;
 pub mod field;
 pub mod gauss_newton;
-pub mod least_squares;
 pub mod objective;
 pub mod robust;
 pub mod search;
@@ -114,7 +112,7 @@ impl Solver {
         let started = Instant::now();
         let mut solution = match self {
             Self::Finished => by_search::solve_finished(problem, options)?,
-            Self::LeastSquares => least_squares::solve::solve(problem, options.known.as_slice())?,
+            Self::LeastSquares => field::least_squares::solve(problem, options.known.as_slice())?,
             Self::Search(kind) => by_search::solve(kind, problem, options)?,
         };
         solution.elapsed = started.elapsed();
@@ -162,7 +160,7 @@ pub struct Solution {
     /// The solver's own zero deviation of each movement of the log, m; zero where the model has
     /// none or the movement had no row.
     pub delta_m: Vec<[f64; 3]>,
-    /// Weighted sum of squared errors over the problem's rows, um^2.
+    /// Sum of squared errors over the problem's rows by their weights, um^2.
     pub cost: f64,
     /// Evaluations of the cost.
     pub evaluations: u64,

@@ -10,13 +10,14 @@
 //! Noise alone does not come near k, so every row of a clean log has the weight 1 and
 //! the fit is that of least squares, bit for bit.
 
-use super::least_squares::rows::Decoder;
-use super::least_squares::solve::solve;
+use super::field::least_squares::solve;
+use super::field::pose::Decoder;
 use super::{Solution, SolveError};
 use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
 use hallstage_input::statistics::median;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// From how many robust standard deviations on a row counts less.
 const THRESHOLD: f64 = 6.0;
@@ -136,9 +137,10 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
     let mut solution = solve(&problem, &[])?;
     for _ in 0..ROUNDS {
         let residuals = residuals_um(&problem, &solution.parameters);
-        let movements = problem.groups.iter().map(|group| group.rows.clone());
+        let movements = problem.rows.movement_rows();
         let weights = least_magnitudes(residuals.ok_or(SolveError::NoUsableStart)?, movements);
-        for (row, weight) in problem.rows.iter_mut().zip(weights) {
+        let rows = &mut Arc::make_mut(&mut problem.rows).rows;
+        for (row, weight) in rows.iter_mut().zip(weights) {
             row.weight = weight;
         }
         solution = solve(&problem, &[solution.parameters])?;
@@ -149,8 +151,13 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
 /// The reference less the decoded pose of every row, with no offset taken off, um, um, urad;
 /// `None` next to a pole.
 fn residuals_um(problem: &Problem<'_>, parameters: &Parameters) -> Option<Vec<[f64; 3]>> {
-    let decoder = Decoder::new(problem, parameters)?;
-    problem.rows.iter().map(|row| decoder.error(row)).collect()
+    let decoder = Decoder::new(parameters, problem.stage)?;
+    problem
+        .rows
+        .rows
+        .iter()
+        .map(|row| decoder.error(row))
+        .collect()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use super::probe::{Probe, Reading};
 use super::terms::PER_PROBE;
 use crate::solve::robust::HALF;
 use hallstage_input::dataset::Dataset;
+use hallstage_input::stage;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -18,6 +19,12 @@ const ROWS_MAX: usize = 10;
 const MOTION_MAX: f64 = 0.06;
 /// A block ends after this time, s: the reference drifts.
 const TIME_MAX_S: f64 = 0.05;
+/// Rows that thinned rows have of a movement at least, if it moves.
+const MOVING_ROWS_MIN: usize = 8;
+/// Rows that they have of a movement that stands still.
+const IDLE_ROWS: usize = 2;
+/// A movement of less than this share of the largest one stands still.
+const IDLE_SHARE: f64 = 0.01;
 
 /// One row.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +54,10 @@ pub struct Rows {
     pub blocks: Vec<Range<usize>>,
     /// The blocks of each movement that has rows.
     pub movements: Vec<Range<usize>>,
+    /// The number of each of these movements in the log.
+    pub numbers: Vec<usize>,
+    /// Movements of the whole log, with or without rows here.
+    pub movements_of_log: usize,
     /// Largest magnitudes of X, Y, Rz (mm, mm, mrad), each movement's middle taken off.
     pub planar_range_mm: [f64; 3],
     /// Largest magnitudes of Z, Rx, Ry: m, rad, rad.
@@ -90,14 +101,19 @@ impl Rows {
         let used: Vec<(usize, f64)> = used.filter(|(_, weight)| *weight > 0.0).collect();
         let row = |&(k, weight): &(usize, f64)| field_row(dataset, k, &trusted, weight);
         let rows: Vec<FieldRow> = used.par_iter().map(row).collect();
-        let mut movements = Vec::new();
+        let (mut movements, mut numbers) = (Vec::new(), Vec::new());
         let mut start = 0;
         let movement = |(k, _): &(usize, f64)| dataset.rows[*k].movement;
         for chunk in used.chunk_by(|a, b| movement(a) == movement(b)) {
+            numbers.extend(chunk.first().map(movement));
             movements.push(start..start + chunk.len());
             start += chunk.len();
         }
-        Self::of_movements(rows, movements)
+        Self {
+            numbers,
+            movements_of_log: dataset.movements.len(),
+            ..Self::of_movements(rows, movements)
+        }
     }
 
     /// Rows in time order, and where each movement stands among them.
@@ -137,6 +153,8 @@ impl Rows {
         Self {
             rows,
             blocks,
+            numbers: (0..by_movement.len()).collect(),
+            movements_of_log: by_movement.len(),
             movements: by_movement,
             planar_range_mm,
             vertical_range,
@@ -166,6 +184,7 @@ impl Rows {
         let means = Self {
             blocks: (0..rows.len()).map(|k| k..k + 1).collect(),
             rows,
+            numbers: (0..movements.len()).collect(),
             movements,
             ..*self
         };
@@ -221,6 +240,38 @@ impl Rows {
         movements.into_par_iter().flat_map(of_movement).collect()
     }
 
+    /// About `most` of the rows: the same number from each movement that moves, evenly, and at least
+    /// eight, since fewer rows would say little beside the zero deviation that they share; two from each that
+    /// does not.
+    #[must_use]
+    pub fn thinned(&self, most: usize) -> Self {
+        let movements: Vec<Range<usize>> = self.movement_rows().collect();
+        let moved: Vec<f64> = (movements.par_iter())
+            .map(|rows| moved_mm(&self.rows[rows.clone()]))
+            .collect();
+        let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
+        let moving = moved.iter().filter(|moved| **moved > idle).count();
+        let quota = (most / moving.max(1)).max(MOVING_ROWS_MIN);
+        let (mut rows, mut thinned) = (Vec::with_capacity(most), Vec::new());
+        for (movement, moved) in movements.into_iter().zip(moved) {
+            let wanted = if moved > idle { quota } else { IDLE_ROWS };
+            let stride = movement.len().div_ceil(wanted).max(1);
+            let start = rows.len();
+            rows.extend(self.rows[movement].iter().step_by(stride));
+            thinned.push(start..rows.len());
+        }
+        Self {
+            numbers: self.numbers.clone(),
+            movements_of_log: self.movements_of_log,
+            ..Self::of_movements(rows, thinned)
+        }
+    }
+
+    /// Number in the log and rows of each movement.
+    pub fn numbered_movements(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        self.numbers.iter().copied().zip(self.movement_rows())
+    }
+
     /// Rows of each movement.
     pub fn movement_rows(&self) -> impl Iterator<Item = Range<usize>> {
         let rows = |blocks: &Range<usize>| {
@@ -270,6 +321,15 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
         rate_mm_per_s: [rate(0), rate(1), rate(2)],
         weight,
     }
+}
+
+/// How far a movement moves: the largest range of X, Y (mm) and Rz (mrad) by the reference.
+fn moved_mm(rows: &[FieldRow]) -> f64 {
+    let span = |axis: usize| {
+        let of_axis = rows.iter().map(|row| row.reference_mm[axis]);
+        stage::Range::around(of_axis).width()
+    };
+    (0..3).map(span).fold(0.0, f64::max)
 }
 
 fn mean_row(rows: &[FieldRow]) -> FieldRow {

@@ -8,6 +8,7 @@ use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::{FieldParameters, unknowns};
 use super::posterior::{Posterior, warmth_errors};
 use super::probe::probes;
+use super::sandwich::ReferenceLag;
 use super::terms::COUNT;
 use super::warmth::{Sensors, Warmth};
 use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS, WARMTH};
@@ -43,8 +44,8 @@ pub struct FieldFit {
     pub parameters: FieldParameters,
     /// How well the log determines them.
     pub posterior: Posterior,
-    /// Lag of the reference behind the probes, s: positive where it shows an earlier pose.
-    pub lag_s: f64,
+    /// Lag of the reference behind the probes; `None` where the log shows nothing of it.
+    pub lag: Option<ReferenceLag>,
     /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
     pub offsets_mm: Vec<[f64; 3]>,
     /// The weights of the rows used.
@@ -95,7 +96,8 @@ pub fn fit_field(
     stage: &Stage,
     start: &Parameters,
 ) -> Result<FieldFit, FieldFitError> {
-    WhiteFit::new(dataset, selected, stage, start)?.finish(stage)
+    let rows = Rows::new(dataset, selected).into();
+    WhiteFit::new(dataset, rows, stage, start)?.finish(stage)
 }
 
 /// The first phase of a fit: under white noise, each row with its weight.
@@ -123,24 +125,23 @@ impl WhiteFit {
     /// See [`FieldFitError`].
     pub fn new(
         dataset: &Dataset,
-        selected: &[usize],
+        rows: Arc<Rows>,
         stage: &Stage,
         start: &Parameters,
     ) -> Result<Self, FieldFitError> {
-        let mut fit = Self::start(dataset, selected, stage, start);
+        let mut fit = Self::start(dataset, rows, stage, start);
         fit.under_white_noise(stage, WHITE)?;
         Ok(fit)
     }
 
-    fn start(dataset: &Dataset, selected: &[usize], stage: &Stage, start: &Parameters) -> Self {
-        let rows: Arc<Rows> = Rows::new(dataset, selected).into();
+    fn start(dataset: &Dataset, rows: Arc<Rows>, stage: &Stage, start: &Parameters) -> Self {
         let places = stage.places_m();
         let sensors = Sensors::new(dataset, stage);
         let mut values = DVector::zeros(UNKNOWNS);
         let parameters = FieldParameters::of_model_31(start, stage);
         values.as_mut_slice()[..COUNT].copy_from_slice(parameters.probes.as_flattened());
         Self {
-            weights: vec![1.0; selected.len()],
+            weights: vec![1.0; rows.rows.len()],
             at: Point {
                 values,
                 offsets: vec![[0.0; 3]; rows.movements.len()],
@@ -178,7 +179,8 @@ impl WhiteFit {
         start: &Parameters,
         loss: Loss,
     ) -> Result<Self, FieldFitError> {
-        let mut fit = Self::start(dataset, selected, stage, start);
+        let rows = Rows::new(dataset, selected).into();
+        let mut fit = Self::start(dataset, rows, stage, start);
         for _ in 0..ROUNDS_MAX {
             let weights = fit.weights_by(loss);
             let mut pairs = fit.weights.iter().zip(&weights);
@@ -229,6 +231,10 @@ impl WhiteFit {
             normal = self.descend(Limits::CLOSE)?.normal;
         }
         let covariance = self.covariance(&normal)?;
+        let lag = ReferenceLag {
+            value_s: self.lag_s(),
+            standard_error_s: covariance[(COUNT, COUNT)].sqrt(),
+        };
         let (posterior, warmth) = self.with_warmth(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
@@ -256,7 +262,7 @@ impl WhiteFit {
                 gain_per_k: [[0.0; 2]; 3],
                 ..self.parameters()
             },
-            lag_s: self.lag_s(),
+            lag: (lag.standard_error_s > 0.0).then_some(lag),
             offsets_mm: self.at.offsets,
             weights: self.weights,
             iterations: self.iterations,

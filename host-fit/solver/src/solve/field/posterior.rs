@@ -23,8 +23,6 @@ pub struct Posterior {
     pub covariance: DMatrix<f64>,
     /// Which parameters these are, by their places among the 81 and k and h.
     pub determined: Vec<usize>,
-    /// Standard error of the lag of the reference, s; `None` where the log shows nothing of it.
-    pub lag_error_s: Option<f64>,
     parameters: FieldParameters,
     pub(super) white_mm: [f64; 3],
 }
@@ -102,12 +100,8 @@ pub fn warmth_errors(covariance: &DMatrix<f64>) -> Option<[[f64; 2]; 3]> {
 
 impl Posterior {
     pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
-        let lag = with_lag[(COUNT, COUNT)];
         let covariance = with_lag.view((0, 0), (COUNT, COUNT)).into_owned();
-        Self {
-            lag_error_s: (lag > 0.0).then(|| lag.sqrt()),
-            ..Self::of_parameters(covariance, parameters, noise)
-        }
+        Self::of_parameters(covariance, parameters, noise)
     }
 
     /// Of parameters with this covariance, for probes with this noise.
@@ -119,7 +113,6 @@ impl Posterior {
         Self {
             determined: (0..covariance.nrows()).collect(),
             covariance,
-            lag_error_s: None,
             parameters: *parameters,
             white_mm: noise.white_mm,
         }
@@ -134,7 +127,6 @@ impl Posterior {
         Self {
             covariance,
             determined,
-            lag_error_s: None,
             parameters: *parameters,
             white_mm: [0.0; 3],
         }

@@ -89,13 +89,10 @@ fn a_lag_of_the_reference_is_found_and_does_no_harm() {
         lag_rows: 2,
         ..Run::EIGHT_SECONDS
     });
-    let error = lagging.posterior.lag_error_s.expect("a lag");
+    let lag = lagging.lag.expect("a lag");
+    let error = lag.standard_error_s;
     assert!(error < 20e-6, "{error}");
-    assert!(
-        (lagging.lag_s - 0.004).abs() < 5.0 * error,
-        "{}",
-        lagging.lag_s
-    );
+    assert!((lag.value_s - 0.004).abs() < 5.0 * error, "{}", lag.value_s);
     for (k, x) in normalized(&lagging).iter().enumerate() {
         assert!(x.abs() < 4.5, "{}: {x}", name(k));
     }

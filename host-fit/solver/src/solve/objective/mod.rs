@@ -1,6 +1,6 @@
 //! The fitness of a fit as a cost function of a search.
 //!
-//! The fitness is the root of the mean over rows and axes of the weighted squared pose error,
+//! The fitness is the root of the mean over rows and axes of the squared pose error,
 //! in um, um and urad: [`Problem::fitness`]. How much of the problem is solved in closed form
 //! says what an individual holds:
 //!
@@ -31,8 +31,8 @@ mod tests;
 use crate::problem::Problem;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, search_box};
 use crate::solve::Projection;
-use crate::solve::least_squares::gains::{Point, parameters_of, point_of};
-use crate::solve::least_squares::solve::zero_deviations;
+use crate::solve::field::least_squares::zero_deviations;
+use crate::solve::field::linear::{Point, parameters_of, point_of};
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use hallstage_input::stage::{Range, paper_signs};
@@ -57,11 +57,13 @@ impl<'a> Objective<'a> {
     pub fn new(problem: &'a Problem<'a>, projection: Projection) -> Option<Self> {
         let stage = problem.stage;
         let mut ranges = search_box(stage, problem.model, [0.0; 3]);
-        let extent = slope_extent(&problem.rows);
+        let extent = slope_extent(&problem.rows.rows);
         let free = problem.model.free_count();
         let bounds = match projection {
             Projection::None => {
-                let delta = 3 * problem.movements * usize::from(problem.model.has_zero_deviation);
+                let delta = 3
+                    * problem.rows.movements_of_log
+                    * usize::from(problem.model.has_zero_deviation);
                 let mut bounds = paper_signs(stage.search.places_m).concat();
                 bounds.extend(&ranges[THETA..free]);
                 bounds.extend(std::iter::repeat_n(stage.search.delta_m, delta));
@@ -163,9 +165,10 @@ impl<'a> Objective<'a> {
         if self.projection != Projection::None {
             return None;
         }
-        let mut delta_m = vec![[0.0; 3]; self.problem.movements];
-        for group in &self.problem.groups {
-            delta_m[group.movement] = self.delta_m_of(individual, group.movement);
+        let rows = &self.problem.rows;
+        let mut delta_m = vec![[0.0; 3]; rows.movements_of_log];
+        for &movement in &rows.numbers {
+            delta_m[movement] = self.delta_m_of(individual, movement);
         }
         Some(delta_m)
     }
@@ -212,7 +215,7 @@ impl<'a> Objective<'a> {
         }
     }
 
-    /// Sums of the squared errors of X, Y, Rz; `None` where there is no pose, or where a row is too
+    /// Sums of the squared errors of X, Y, Rz, um^2; `None` where there is no pose, or where a row is too
     /// near to a pole.
     fn squares(&self, individual: &[f64]) -> Option<Vector3<f64>> {
         let problem = self.problem;
@@ -235,11 +238,8 @@ impl CostFunction for Objective<'_> {
     }
 
     fn cost(&self, individual: &[f64]) -> f64 {
-        let weights = Vector3::from(self.problem.weights);
         let squares = self.squares(individual);
-        squares.map_or(f64::NAN, |squares| {
-            self.problem.fitness(squares.dot(&weights))
-        })
+        squares.map_or(f64::NAN, |squares| self.problem.fitness(squares.sum()))
     }
 }
 

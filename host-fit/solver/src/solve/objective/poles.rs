@@ -8,14 +8,14 @@
 //! is NaN; and the range of each slope is cut where it alone would break that rule. The form
 //! `none` is the paper's and has neither.
 
-use crate::problem::TrainRow;
+use crate::solve::field::blocks::FieldRow;
 use hallstage_input::stage::Range;
 
 /// Smallest phi / eta of any row: at a twentieth, noise is already twenty times larger.
 pub const SHARE_MIN: f64 = 0.05;
 
 /// Lowest and highest Z, Rx, Ry over some rows, zero included: m, rad, rad.
-pub fn slope_extent(rows: &[TrainRow]) -> [Range; 3] {
+pub fn slope_extent(rows: &[FieldRow]) -> [Range; 3] {
     [0, 1, 2].map(|k| Range::around(rows.iter().map(|row| row.vertical[k]).chain([0.0])))
 }
 

@@ -1,15 +1,19 @@
-//! Sums of squared pose errors over the rows of a problem, in um, um, urad.
+//! Sums of squared pose errors over the rows of a problem, um^2, um^2, urad^2, from rows in mm and mrad.
 //!
 //! The same equations as `runtime::model`, which is the model; a test holds the two equal
 //! within rounding. eta moves from phi into the matrix: PM^-1 (s / phi - delta / eta) =
 //! G (s' - delta) with G = PM^-1 diag(1/eta) and s' = s / (phi / eta).
 
 use super::poles::SHARE_MIN;
+use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
-use crate::problem::{Problem, TrainRow};
-use crate::solve::least_squares::gains::Point;
+use crate::solve::field::blocks::FieldRow;
+use crate::solve::field::linear::Point;
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::{from_rows, inverse};
+
+/// um^2 in a mm^2.
+const UM2_PER_MM2: f64 = 1e6;
 
 /// The slopes over eta of A, B, C.
 struct Ratios(Matrix3<f64>);
@@ -19,12 +23,12 @@ impl Ratios {
         Self(from_rows(ratios))
     }
 
-    /// phi / eta of the three probes at a row (equation 33), and s' there, um.
+    /// phi / eta of the three probes at a row (equation 33), and s' there, mm.
     #[inline(always)]
-    fn correct(&self, row: &TrainRow) -> (Vector3<f64>, Vector3<f64>) {
+    fn correct(&self, row: &FieldRow) -> (Vector3<f64>, Vector3<f64>) {
         let shares = Vector3::repeat(1.0) + self.0 * Vector3::from(row.vertical);
-        let corrected_um = Vector3::from(row.signal_um).component_div(&shares);
-        (shares, corrected_um)
+        let corrected_mm = Vector3::from(row.signal_mm).component_div(&shares);
+        (shares, corrected_mm)
     }
 }
 
@@ -36,15 +40,15 @@ pub fn with_delta(
 ) -> Vector3<f64> {
     let ratios = Ratios::new(&point.ratios);
     let mut squares = Vector3::zeros();
-    for group in &problem.groups {
-        let zero_um = point.gain * (Vector3::from(delta_m(group.movement)) * 1e6);
-        for row in &problem.rows[group.rows.clone()] {
-            let (_, corrected_um) = ratios.correct(row);
-            let error = point.gain * corrected_um - Vector3::from(row.reference_um) - zero_um;
+    for (number, movement) in problem.rows.numbered_movements() {
+        let zero_mm = point.gain * (Vector3::from(delta_m(number)) * 1e3);
+        for row in &problem.rows.rows[movement] {
+            let (_, corrected_mm) = ratios.correct(row);
+            let error = point.gain * corrected_mm - Vector3::from(row.reference_mm) - zero_mm;
             squares += error.component_mul(&error);
         }
     }
-    squares
+    squares * UM2_PER_MM2
 }
 
 /// At the best zero deviation of each movement: it takes off the movement's mean pose error,
@@ -60,30 +64,30 @@ pub fn with_best_delta(
     let to_delta = eta * parameters.geometry().plane();
     let mut smallest = Vector3::repeat(f64::INFINITY);
     let mut squares = Vector3::zeros();
-    for group in &problem.groups {
-        let rows = &problem.rows[group.rows.clone()];
+    for movement in problem.rows.movement_rows() {
+        let rows = &problem.rows.rows[movement];
         let (mut sum, mut here) = (Vector3::zeros(), Vector3::zeros());
         for row in rows {
-            let (shares, corrected_um) = ratios.correct(row);
+            let (shares, corrected_mm) = ratios.correct(row);
             smallest = smallest.inf(&shares);
-            let error = point.gain * corrected_um - Vector3::from(row.reference_um);
+            let error = point.gain * corrected_mm - Vector3::from(row.reference_mm);
             sum += error;
             here += error.component_mul(&error);
         }
         if problem.model.has_zero_deviation {
             let n = rows.len() as f64;
             let mean = sum / n;
-            let delta_um = (to_delta * mean).map(|um| range.clip(um * 1e-6) * 1e6);
+            let delta_mm = (to_delta * mean).map(|mm| range.clip(mm * 1e-3) * 1e3);
             // Sum of (error - zero)^2, free of the cancellation that zero^2 would bring.
-            let off = mean - point.gain * delta_um;
+            let off = mean - point.gain * delta_mm;
             here += off.component_mul(&off) * n - sum.component_mul(&mean);
         }
         squares += here;
     }
-    (smallest.min() > SHARE_MIN).then_some(squares)
+    (smallest.min() > SHARE_MIN).then_some(squares * UM2_PER_MM2)
 }
 
-/// The gain, um, um, urad per um, and one offset of each movement that fit best, and the squares
+/// The gain, mm, mm, mrad per mm, and one offset of each movement that fit best, and the squares
 /// that they leave. With s' and q each less its mean over the movement, A = sum s' s'^T and
 /// B = sum s' q^T, G^T is A^-1 B.
 pub fn best_gain(
@@ -94,12 +98,12 @@ pub fn best_gain(
     let mut smallest = Vector3::repeat(f64::INFINITY);
     let (mut signal, mut mixed) = (Matrix3::zeros(), Matrix3::zeros());
     let mut squares = Vector3::zeros();
-    for group in &problem.groups {
-        let rows = &problem.rows[group.rows.clone()];
+    for movement in problem.rows.movement_rows() {
+        let rows = &problem.rows.rows[movement];
         let (mut signal_sum, mut reference_sum) = (Vector3::zeros(), Vector3::zeros());
         for row in rows {
             let (shares, s) = ratios.correct(row);
-            let q = Vector3::from(row.reference_um);
+            let q = Vector3::from(row.reference_mm);
             smallest = smallest.inf(&shares);
             signal_sum += s;
             reference_sum += q;
@@ -118,5 +122,5 @@ pub fn best_gain(
     let gain = mixed.tr_mul(&inverse(&signal)?);
     let left = squares - (gain * mixed).diagonal();
     // Rounding could make an exact fit negative.
-    Some((gain, left.map(|left| left.max(0.0))))
+    Some((gain, left.map(|left| UM2_PER_MM2 * left.max(0.0))))
 }

@@ -1,9 +1,10 @@
 //! A small log for tests of the objective: Model (31) with noise of a known seed.
 
+use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic::Protocol;
-use crate::problem::{Problem, TrainRow};
+use crate::solve::field::blocks::FieldRow;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped;
 use hallstage_input::stage::{Range, Stage};
@@ -77,7 +78,7 @@ pub fn problem<'a>(dataset: &Dataset, stage: &'a Stage, model: ModelKind) -> Pro
 }
 
 /// The sensitivities of the probes in a row.
-pub fn phi(parameters: &Parameters, row: &TrainRow) -> [f64; 3] {
+pub fn phi(parameters: &Parameters, row: &FieldRow) -> [f64; 3] {
     let vertical = VerticalPose::from_array(row.vertical);
     (parameters.sensitivity()).map(|probe| sensitivity_at(&probe, &vertical))
 }
@@ -86,10 +87,10 @@ pub fn phi(parameters: &Parameters, row: &TrainRow) -> [f64; 3] {
 pub fn pose_by_the_runtime(
     parameters: &Parameters,
     plane_inverse: &Matrix3<f64>,
-    row: &TrainRow,
+    row: &FieldRow,
     zero: &PlanarPose<f64>,
 ) -> [f64; 3] {
-    let signal = row.signal_um.map(|s| s * 1e-6);
+    let signal = row.signal_mm.map(|s| s * 1e-3);
     planar_pose(&to_rows(plane_inverse), signal, phi(parameters, row), zero).to_array()
 }
 
@@ -103,14 +104,13 @@ pub fn fitness_by_the_runtime(
         return f64::NAN;
     };
     let mut cost = 0.0;
-    for group in &problem.groups {
-        let zero = zero_pose(&inverse, parameters.eta(), delta_m[group.movement]);
-        for row in &problem.rows[group.rows.clone()] {
+    for (number, movement) in problem.rows.numbered_movements() {
+        let zero = zero_pose(&inverse, parameters.eta(), delta_m[number]);
+        for row in &problem.rows.rows[movement] {
             let pose = pose_by_the_runtime(parameters, &inverse, row, &zero);
-            let axes = pose.iter().zip(row.reference_um).zip(problem.weights);
-            for ((pose, reference), weight) in axes {
-                let error = pose * 1e6 - reference;
-                cost += weight * error * error;
+            for (pose, reference) in pose.iter().zip(row.reference_mm) {
+                let error = pose * 1e6 - reference * 1e3;
+                cost += error * error;
             }
         }
     }

@@ -5,11 +5,12 @@ use super::poles::SHARE_MIN;
 use super::sample_for_tests::{
     dataset, fitness_by_the_runtime, phi, pose_by_the_runtime, problem, stage, truth,
 };
+use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
-use crate::problem::{Problem, TrainRow};
 use crate::solve::Projection;
+use crate::solve::field::blocks::FieldRow;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use hallstage_input::stage::Range;
@@ -44,41 +45,45 @@ fn assert_close(have: f64, want: f64, relative: f64, what: &str) {
 /// The mean pose error of each movement by the runtime's model, and so its zero deviation.
 fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDeviation> {
     let inverse = inverse(&parameters.geometry().plane()).expect("sound");
-    let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
-    for group in &problem.groups {
-        let rows = &problem.rows[group.rows.clone()];
+    let mut zeros = vec![ZeroDeviation::NONE; problem.rows.movements_of_log];
+    for (number, movement) in problem.rows.numbered_movements() {
+        let rows = &problem.rows.rows[movement];
         let mut mean = [0.0; 3];
         for row in rows {
             let pose = pose_by_the_runtime(parameters, &inverse, row, &PlanarPose::ZERO);
             for k in 0..3 {
-                mean[k] += (pose[k] - row.reference_um[k] * 1e-6) / rows.len() as f64;
+                mean[k] += (pose[k] - row.reference_mm[k] * 1e-3) / rows.len() as f64;
             }
         }
         let range = &problem.stage.search.delta_m;
         // A search holds them within their range.
         let mut zero = ZeroDeviation::of_mean_error(parameters, mean, range);
         zero.delta_m = zero.delta_m.map(|delta| range.clip(delta));
-        zeros[group.movement] = zero;
+        zeros[number] = zero;
     }
     zeros
 }
 
 /// The smallest phi / eta of all rows by the runtime's model.
 fn smallest_share(problem: &Problem<'_>, parameters: &Parameters) -> f64 {
-    let share = |row: &TrainRow| {
+    let share = |row: &FieldRow| {
         let shares = phi(parameters, row).into_iter().zip(parameters.eta());
         let shares = shares.map(|(phi, eta)| phi / eta);
         shares.fold(f64::INFINITY, f64::min)
     };
-    problem.rows.iter().map(share).fold(f64::INFINITY, f64::min)
+    problem
+        .rows
+        .rows
+        .iter()
+        .map(share)
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[test]
 fn the_full_form_equals_the_runtimes_model() {
     let (stage, dataset) = (stage(), dataset(7, 5));
     for model in MODELS {
-        let mut problem = problem(&dataset, &stage, model);
-        problem.weights = [1.0, 2.0, 0.5];
+        let problem = problem(&dataset, &stage, model);
         let cost = objective(&problem, Projection::None);
         for number in 0..50 {
             let individual = draw(&cost, number);
@@ -102,8 +107,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
     };
     let (mut clipped, mut beyond_pole) = (0, 0);
     for model in MODELS {
-        let mut problem = problem(&dataset, &stage, model);
-        problem.weights = [1.0, 2.0, 0.5];
+        let problem = problem(&dataset, &stage, model);
         let cost = objective(&problem, Projection::Delta);
         let near = cost.individual(&truth());
         for number in 0..50 {
@@ -116,7 +120,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
             let zeros = if Model::of(model).has_zero_deviation {
                 zero_deviations(&problem, &parameters)
             } else {
-                vec![ZeroDeviation::NONE; problem.movements]
+                vec![ZeroDeviation::NONE; problem.rows.movements_of_log]
             };
             let cost = cost.cost(&individual);
             if smallest_share(&problem, &parameters) < SHARE_MIN {
@@ -137,8 +141,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
 #[test]
 fn the_linear_form_equals_the_runtimes_model_at_its_own_gain_and_offsets() {
     let (stage, dataset) = (stage(), dataset(9, 6));
-    let mut problem = problem(&dataset, &stage, ModelKind::M31);
-    problem.weights = [1.0, 2.0, 0.5];
+    let problem = problem(&dataset, &stage, ModelKind::M31);
     let cost = objective(&problem, Projection::Linear);
     let mut wide = stage.clone();
     wide.search.delta_m = Range {
@@ -197,6 +200,7 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
     let last = linear.bounds()[8];
     let lowest = problem
         .rows
+        .rows
         .iter()
         .map(|row| row.vertical[2])
         .fold(0.0, f64::min);
@@ -249,7 +253,7 @@ fn whatever_lies_beyond_a_pole_costs_nan() {
     let sound = cost.individual(&truth());
     assert!(cost.cost(&sound) < 3.0);
     // a / eta of A that leaves the first row a share of 0.06, 0.04, -0.5 of eta.
-    let [z, rx, ry] = problem.rows[0].vertical;
+    let [z, rx, ry] = problem.rows.rows[0].vertical;
     let at_share = |share: f64| {
         let mut individual = sound.clone();
         individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;

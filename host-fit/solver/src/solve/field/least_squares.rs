@@ -1,7 +1,7 @@
-//! The fit of a model of the paper: a start from a regression, then Gauss-Newton.
+//! The fit of a model of the paper by the errors of the pose: a start from a regression, then Gauss-Newton.
 
-use super::gains::{Point, parameters_of};
-use super::rows::{COLUMNS, Decoder};
+use super::linear::{Point, parameters_of};
+use super::pose::{COLUMNS, Decoder};
 use crate::problem::Problem;
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::{Parameters, SLOPES, THETA, search_box};
@@ -36,7 +36,7 @@ pub fn solve(problem: &Problem, starts: &[Parameters]) -> Result<Solution, Solve
 fn ranges(problem: &Problem, theta: [f64; 3], within: bool) -> [Range; COUNT] {
     let mut ranges = search_box(problem.stage, problem.model, theta);
     if !within {
-        for index in free(problem) {
+        for index in problem.free() {
             ranges[index] = Range::new(f64::NEG_INFINITY, f64::INFINITY);
         }
     }
@@ -103,7 +103,7 @@ pub(super) fn fit(
     let best = looked.min_by(|a, b| a.normal.chi_squared().total_cmp(&b.normal.chi_squared()));
     let mut at = best.ok_or(SolveError::NoUsableStart)?;
     let mut steps = 0;
-    let is_few = few.rows.len() < problem.rows.len() / 2;
+    let is_few = few.rows.rows.len() < problem.rows.rows.len() / 2;
     for problem in is_few.then_some(&few).into_iter().chain([problem]) {
         for _ in 0..if within { ROUNDS_MAX } else { 1 } {
             at = descend(problem, &parameters(&at), LIMITS).ok_or(SolveError::NoUsableStart)?;
@@ -130,18 +130,18 @@ pub(super) fn fit(
 }
 
 fn parameters(solved: &Solved<COLUMNS>) -> Parameters {
-    let mut values = [0.0; COUNT];
-    values.copy_from_slice(solved.point.values.as_slice());
-    Parameters { values }
+    Parameters::from_slice(solved.point.values.as_slice())
 }
 
-/// The parameters that are fitted: those that the model fits, but for those that stage.toml fixes by
-/// a range without width.
-pub fn free(problem: &Problem) -> Vec<usize> {
-    // Away from zero, where both coordinates of a probe count in its lever arm.
-    let ranges = search_box(problem.stage, problem.model, [0.1; 3]);
-    let ids = problem.model.free().map(|id| id.index);
-    ids.filter(|&index| ranges[index].width() > 0.0).collect()
+impl Problem<'_> {
+    /// The parameters that are fitted: those that the model fits, but for those that stage.toml fixes by
+    /// a range without width.
+    pub fn free(&self) -> Vec<usize> {
+        // Away from zero, where both coordinates of a probe count in its lever arm.
+        let ranges = search_box(self.stage, self.model, [0.1; 3]);
+        let ids = self.model.free().map(|id| id.index);
+        ids.filter(|&index| ranges[index].width() > 0.0).collect()
+    }
 }
 
 /// The free parameters that stand at an end of their range or beyond it.
@@ -160,13 +160,13 @@ pub fn at_limit(stage: &Stage, model: &'static Model, parameters: &Parameters) -
 fn regression(problem: &Problem) -> Option<Parameters> {
     let mut squares = Matrix3::zeros();
     let mut products = Matrix3::zeros();
-    for group in &problem.groups {
-        let rows = &problem.rows[group.rows.clone()];
+    for movement in problem.rows.movement_rows() {
+        let rows = &problem.rows.rows[movement];
         let (mut of_q, mut of_s, mut weights) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         for row in rows {
             let (q, s) = (
-                Vector3::from(row.reference_um),
-                Vector3::from(row.signal_um),
+                Vector3::from(row.reference_mm),
+                Vector3::from(row.signal_mm),
             );
             of_q += q * row.weight;
             of_s += s * row.weight;
@@ -205,18 +205,18 @@ fn regression(problem: &Problem) -> Option<Parameters> {
 /// The zero deviation of every movement of the log; none where the model has none or the movement no
 /// row, and where the parameters have no pose.
 pub fn zero_deviations(problem: &Problem, parameters: &Parameters) -> Vec<ZeroDeviation> {
-    let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
-    let Some(decoder) = Decoder::new(problem, parameters) else {
+    let mut zeros = vec![ZeroDeviation::NONE; problem.rows.movements_of_log];
+    let Some(decoder) = Decoder::new(parameters, problem.stage) else {
         return zeros;
     };
     if !problem.model.has_zero_deviation {
         return zeros;
     }
-    for group in &problem.groups {
+    for (number, movement) in problem.rows.numbered_movements() {
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
-        for row in &problem.rows[group.rows.clone()] {
+        for row in &problem.rows.rows[movement] {
             let Some(error) = decoder.error(row) else {
-                return vec![ZeroDeviation::NONE; problem.movements];
+                return vec![ZeroDeviation::NONE; problem.rows.movements_of_log];
             };
             for (sum, error) in sum.iter_mut().zip(error) {
                 *sum -= row.weight * error;
@@ -225,7 +225,11 @@ pub fn zero_deviations(problem: &Problem, parameters: &Parameters) -> Vec<ZeroDe
         }
         let mean = sum.map(|sum| sum / weights * 1e-6);
         let range = &problem.stage.search.delta_m;
-        zeros[group.movement] = ZeroDeviation::of_mean_error(parameters, mean, range);
+        zeros[number] = ZeroDeviation::of_mean_error(parameters, mean, range);
     }
     zeros
 }
+
+#[cfg(test)]
+#[path = "least_squares_tests.rs"]
+mod tests;

@@ -1,10 +1,10 @@
 use super::*;
-use crate::synthetic::Protocol;
+use crate::problem::model::Model;
+use crate::problem::synthetic::Protocol;
+use crate::solve::{Projection, Solver, SolverOptions};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, STAGE_TOML};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 
 /// Sandwich over the 57 movements of the shipped log, computed apart from this program from
@@ -26,9 +26,10 @@ fn standard_errors_of_the_shipped_log_are_those_of_an_independent_computation() 
     let solution = Solver::LeastSquares
         .solve(&problem, &options)
         .expect("a solution");
-    let found = uncertainty(&problem, &solution.parameters).expect("evaluated");
+    let found = Sandwich::new(&problem, &solution.parameters).expect("evaluated");
+    let found = found.posterior.standard_errors_31();
     for (id, expected) in model.parameters().zip(EXPECTED) {
-        let found = found.standard_error(id.index).expect("determined");
+        let found = found[id.index].expect("determined");
         assert!(
             (found - expected).abs() < 1e-3 * expected,
             "{}: {found:e} {expected:e}",
@@ -60,12 +61,13 @@ fn standard_errors_match_the_spread_over_repeated_logs() {
         let problem = Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31));
         let options = SolverOptions::new(Projection::Linear, 1);
         let solution = (Solver::LeastSquares.solve(&problem, &options)).expect("a fit");
-        let errors = uncertainty(&problem, &solution.parameters).expect("evaluated");
+        let errors = Sandwich::new(&problem, &solution.parameters).expect("evaluated");
+        let errors = errors.posterior.standard_errors_31();
         for k in 0..18 {
             let deviation = solution.parameters.values[k] - truth.values[k];
             sums[k][0] += deviation;
             sums[k][1] += deviation * deviation;
-            claimed[k] += errors.standard_error(k).expect("determined") / logs as f64;
+            claimed[k] += errors[k].expect("determined") / logs as f64;
         }
     }
     for k in 0..18 {

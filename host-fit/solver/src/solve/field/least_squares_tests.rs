@@ -1,13 +1,9 @@
 //! The least-squares fit against known truth and its own derivatives.
 
-use super::gains::{parameters_of, point_of};
-use super::rows::COLUMNS;
-use super::solve::at_limit;
-use super::solve::{fit, solve};
-use crate::problem::Problem;
-use crate::problem::model::{COUNT, Model};
-use crate::problem::parameters::Parameters;
+use super::*;
+use crate::problem::model::Model;
 use crate::problem::synthetic::Protocol;
+use crate::solve::field::linear::point_of;
 use crate::solve::gauss_newton::{Equations, Normal, Point};
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
