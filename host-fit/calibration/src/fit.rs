@@ -1,6 +1,6 @@
 //! The main job: a dataset to a judged calibration.
 //!
-//! dataset -> rows drawn -> parameters and posterior -> parameter set -> judgement. Nothing is written here.
+//! dataset -> rows drawn -> parameters and posterior -> parameter set -> judgement. It writes no file.
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;

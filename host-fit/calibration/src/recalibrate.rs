@@ -1,7 +1,6 @@
 //! A few parameters from a few seconds of log: an old calibration brought up to date.
 //!
-//! old blob and its posterior -> what has changed -> checks -> new blob and its posterior. Nothing
-//! is written here.
+//! old blob and its posterior -> changes -> checks -> new blob and its posterior. It writes no file.
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -49,11 +48,12 @@ use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
 
-/// What a log may leave open: systematic errors in service of this part of the noise (variances)
-/// more than the old calibration had. Two seconds that determine gains leave 0.01, a single axis for
-/// three gains 0.1 and far more; errors in service are then 1.025 times the noise floor ...
+/// Largest increase of the systematic errors in service, over the noise (variances), with gains. After two seconds
+/// that determine the gains it is 0.01, after one axis for three gains 0.1 and far more. Errors in service are
+/// then 1.025 times the noise floor.
 const OPEN_MAX_GAINS: f64 = 0.05;
-/// ... and here 1.1 times: 4 s of all six axes leave 0.1, 2 s leave 1.2.
+/// The same with all parameters: 0.1 after 4 s of all six axes, 1.2 after 2 s. Errors in service are then 1.1 times
+/// the noise floor.
 const OPEN_MAX_ALL: f64 = 0.21;
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +62,7 @@ pub struct Known {
     pub covariance: DMatrix<f64>,
     /// The noise of the log.
     pub noise: Noise,
-    /// Chi-square over residuals of the fit: above 1 by what the model does not describe.
+    /// Chi-square over residuals of the fit; above 1 where the model is incomplete.
     pub misfit: f64,
     /// The faults of the log that the calibration is without, in words: see
     /// [`Repair`](crate::fit::Repair).
@@ -128,7 +128,7 @@ pub enum RecalibrateError {
         "{0} has no temperatures: name their columns in [temperature] of the stage file, and fit a cold and a warm log together"
     )]
     NoTemperature(&'static str),
-    /// The log leaves too much open.
+    /// The log does not determine the change well enough.
     #[error(
         "this log does not tell {}: it leaves errors of {:.2} / {:.2} / {:.2} times the noise floor in X / Y / Rz in \
          service. Record {}", assumed(*change), ratios[0], ratios[1], ratios[2], recording(*change)
@@ -139,7 +139,7 @@ pub enum RecalibrateError {
         /// Errors predicted for service over the noise floor: X, Y, Rz.
         ratios: [f64; 3],
     },
-    /// The log shows another change than the one asked for.
+    /// The log shows another change.
     #[error(
         "{} does not describe this log: its residuals are {ratio:.1} times what noise makes them (chi-square, limit \
          {limit:.2}). {}", assumed(*change), remedy(*change)

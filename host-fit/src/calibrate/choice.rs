@@ -12,13 +12,13 @@ use hallstage_solver::solve::field::update::Change;
 use hallstage_solver::solve::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver};
 
-/// A type whose values are chosen by name.
+/// A setting that is chosen by name.
 pub trait Choice: Clone + Send + Sync + 'static {
     /// Each value, its name and its help, which may be empty.
     fn all() -> Vec<(Self, &'static str, &'static str)>;
 }
 
-/// Choices whose values are the variants of an enum: name and help of each.
+/// Choices for the variants of an enum: name and help of each.
 macro_rules! values {
     ($($type:ty { $($variant:ident: $name:literal, $help:literal;)* })*) => {$(
         impl $crate::calibrate::Choice for $type {
@@ -32,7 +32,7 @@ pub(crate) use values;
 
 values! {
     Projection {
-        None: "none", "Nothing: every zero deviation is an unknown of its own, within its range (the paper)";
+        None: "none", "No part: every zero deviation is an unknown of its own, within its range (the paper)";
         Delta: "delta", "The zero deviations";
         Linear: "linear", "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left";
     }
@@ -43,11 +43,11 @@ values! {
     }
     Draw {
         Stratified: "stratified", "Each movement gives its share, so that none is missed while N is at least their number";
-        Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss one, whose zero deviation then is free";
+        Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss a movement; its zero deviation is then free";
     }
     Zeros<'static> {
         Refit: "fit", "Refit them for each movement";
-        None: "zero", "None: as the target reads without a re-zero";
+        None: "zero", "Take none off: the pose of the target without a re-zero";
     }
     Protocol {
         Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
@@ -60,10 +60,10 @@ values! {
         Skip: "skip", "Leave them out and count them";
     }
     Change {
-        Gain: "gain", "One gain for all probes: 2 s of a sine along Y tell it";
+        Gain: "gain", "One gain for all probes: 2 s of a sine along Y determine it";
         Gains: "gains", "A gain for each probe: 2 s of X, Y and Rz moving at once";
         All: "all", "All parameters, as after a probe was seated anew: 8 s of all six axes moving at once";
-        Temperature: "temperature", "Nothing but the temperature: each run of 8 s at another one adds to k and h";
+        Temperature: "temperature", "The temperature: each run of 8 s at another temperature improves k and h";
     }
     PoseFormat {
         Csv: "csv", "Text";
@@ -93,7 +93,7 @@ impl Choice for Solver {
 }
 
 impl Choice for ModelChoice {
-    /// `auto`, and those of the table.
+    /// `auto`, and the models of the table.
     fn all() -> Vec<(Self, &'static str, &'static str)> {
         let auto = "The field model where the log can carry it, else 31";
         let named = MODELS

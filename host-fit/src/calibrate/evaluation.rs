@@ -28,8 +28,8 @@ const ROWS_MAX: usize = 100_000;
 pub struct EvalOrder {
     /// Which zero deviations are taken off; as the blob's model has them if `None`.
     pub zeros: Option<Zeros<'static>>,
-    /// Largest rms error, in terms of that of the logs that the blob was fitted to; if `None` 3, and 10 for
-    /// models (12) to (31), whose own logs may not show what they lack.
+    /// Largest rms error over the rms error of the logs that the blob was fitted to. If `None` it is 3, and 10 for
+    /// models (12) to (31): their own logs may not show the terms that they lack.
     pub limit: Option<f64>,
 }
 
@@ -62,12 +62,12 @@ impl Evaluation {
         ..ReadOptions::DECODE
     };
 
-    /// Decodes the rows of so many `logs`, which `read` reads and gives row by row to what it gets, counts the
-    /// errors and diagnoses the logs. `known` is what stands beside the blob, which tells how far from its
-    /// temperature it is good.
+    /// Decodes the rows of `logs` logs, counts the errors and diagnoses the logs. `read` reads them and calls its
+    /// argument with each row. `known` is the posterior beside the blob: from it follows how far from its temperature
+    /// the blob is good.
     ///
     /// # Errors
-    /// Those of `read`.
+    /// The errors of `read`.
     pub fn new(
         (set, known): (&ParameterSet, Option<&Known>),
         stage: &Stage,
@@ -159,7 +159,7 @@ impl Evaluation {
                     .to_owned()
             }
             ("", false) => {
-                ". If channels and scales are right, take the field model, from a log in which all six axes move at once"
+                ". If channels and scales are right, take the field model, with a log of all six axes moving at once"
                     .to_owned()
             }
             (refusals, _) => format!(". {refusals}"),

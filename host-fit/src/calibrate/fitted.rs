@@ -38,7 +38,7 @@ pub enum CalibrateError {
 pub struct Outcome {
     /// The fit, without the faults of the log where these can be taken off.
     pub fitted: Result<Fit, FitError>,
-    /// What is wrong with the log, and what the calibration is good for.
+    /// The faults of the log, and the verdict.
     pub diagnosis: Diagnosis,
     /// Why it is not to be used; `None` where it may be.
     pub refusal: Option<String>,
@@ -57,7 +57,7 @@ impl FitOrder {
     /// Fits a log.
     ///
     /// # Errors
-    /// See [`CalibrateError`]; inside the result those of the fit.
+    /// See [`CalibrateError`]; inside the result the errors of the fit.
     pub fn fit(
         &self,
         log: &LogReading,
@@ -122,8 +122,7 @@ impl FitOrder {
 }
 
 impl Outcome {
-    /// Whether it is of the field model, which is made for service; others are for movements like those of
-    /// the log.
+    /// Whether the field model was fitted. It is made for service, the other models for the movements of the log.
     fn is_field(&self) -> bool {
         self.fitted.as_ref().is_ok_and(|fit| fit.field.is_some())
     }
@@ -200,7 +199,7 @@ impl Outcome {
     }
 }
 
-/// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
+/// Why an interrupted search is not to be written: the errors of a finished search are little more than noise.
 fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
     let ratio = of_residuals::over_noise(fit, fit.rows(&log.dataset));
     (ratio > of_residuals::ERROR_TO_NOISE_MAX).then(|| {

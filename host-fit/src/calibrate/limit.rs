@@ -41,8 +41,8 @@ impl FromStr for Limits {
 }
 
 impl Limits {
-    /// The axes whose rms error (m, m, rad) is beyond its limit; `None` if there are none. `which` says where
-    /// these errors stand: in service or on the log.
+    /// The axes with an rms error (m, m, rad) beyond the limit; `None` if there are none. `which` names the errors: in
+    /// service or on the log.
     pub fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
         let beyond = (0..3).filter_map(|axis| {
             let (limit, rms) = (self.0[axis]?, rms[axis]);

@@ -7,8 +7,7 @@ use runtime::model::Probes;
 use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind, Temperature};
 
-/// Room around the motion of the log in which the calibration still holds: offsets of
-/// the reference and overshoot are well inside it.
+/// The calibrated range over the range of the log: offsets of the reference and overshoot are well inside.
 pub(crate) const RANGE_MARGIN: f64 = 1.1;
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion

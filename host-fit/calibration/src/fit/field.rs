@@ -1,5 +1,5 @@
-//! The field model: Model (31) by least squares first, then the field model from there, refused where the
-//! log leaves it worse than Model (31).
+//! The field model: Model (31) by least squares first, then the field model from there. It is refused where
+//! Model (31) has the smaller errors in service.
 
 use super::job::{Job, check_near};
 use super::{Estimate, Fit, FitError, FittedRows};
@@ -13,8 +13,8 @@ use runtime::ModelKind;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The field model under white noise, on which every robust fit rests: its residuals are noise
-/// and what is wrong with the log, where those of Model (31) are mostly what it lacks.
+/// The field model under white noise. Every robust fit takes its weights from here: the residuals of the field
+/// model are noise and faults of the log, the residuals of Model (31) are mostly terms that it lacks.
 pub(super) struct FirstPhase {
     pub(super) field: WhiteFit,
     evaluations: u64,

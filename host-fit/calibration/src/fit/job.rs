@@ -20,7 +20,7 @@ use runtime::ModelKind;
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-/// The fit to rows as they are, a lag of the reference left in.
+/// The fit to rows with their lag of the reference.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -100,7 +100,7 @@ impl<'a> Job<'a> {
         Fit::new(model, estimate, fitted, (self.dataset, self.stage), texts)
     }
 
-    /// Refuses a fit that leaves most of the motion unexplained.
+    /// Refuses a fit that does not explain most of the motion.
     pub(super) fn check_described(&self, fit: &Fit) -> Result<(), FitError> {
         if !self.settings.force {
             let errors = fit.sound_errors(self.dataset, self.stage);
@@ -126,7 +126,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// The rows that count: those of the first phase where the weights are the same.
+    /// The rows that count. Rows with the weights of the first phase are not built again.
     fn rows(&self, fitted: &FittedRows) -> Arc<Rows> {
         match self.first.get() {
             Some(Ok(first)) if first.field.weights == fitted.weights => {
@@ -195,8 +195,8 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A lever arm (m), an angle (rad) or an eta that leaves its search range by more than this, and by
-/// more than the range is wide, is that of sensors in another order or with other signs.
+/// A lever arm (m), an angle (rad) or an eta this far beyond its search range, and farther than the range is wide,
+/// shows sensors in another order or with other signs.
 const FAR: [f64; 3] = [0.1, 0.3, 0.5];
 
 /// # Errors

@@ -1,5 +1,5 @@
-//! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference is
-//! read later by the lag, and the fit is made again, until nothing of the lag is left.
+//! A fit to a log with a lag of the reference. The lag is estimated with the parameters, the reference is read
+//! later by the lag, and the fit is repeated until no lag remains.
 
 use super::job::fit_once;
 use super::{Fit, FitError, FitSettings, ModelChoice, warning};
@@ -8,7 +8,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use runtime::ModelKind;
 
-/// Rounds of fit and interpolation: the first leaves a hundredth of a lag of several rows.
+/// Rounds of fit and interpolation. After the first, a hundredth of a lag of several rows remains.
 const ROUNDS_MAX: u32 = 4;
 /// A lag below this part of its standard error is none.
 const LEFT: f64 = 0.1;
@@ -53,7 +53,7 @@ fn is_clear(found: &Fit, stage: &Stage) -> bool {
         .is_some_and(|lag| warning::late_reference(lag, stage.servo_period_s).is_some())
 }
 
-/// Fits again until nothing of the lag of `found` is left.
+/// Fits again until no lag remains.
 fn again(
     mut found: Fit,
     dataset: &Dataset,

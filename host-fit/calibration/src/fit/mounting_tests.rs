@@ -1,4 +1,4 @@
-//! Stages whose probes stand or point elsewhere than in the paper: from `stage.toml` to a
+//! Stages with probes that stand or point elsewhere than in the paper: from `stage.toml` to a
 //! calibration at the noise floor.
 
 use crate::fit::{FitSettings, ModelChoice, fit};

@@ -7,7 +7,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use nalgebra::DMatrix;
 
-/// Parameters that were estimated together with the faults of a log: those of the stage at its end.
+/// Parameters that were estimated together with the faults of a log. They describe the stage at the end of the log.
 #[derive(Clone, Debug)]
 pub struct Repair {
     /// The parameters.

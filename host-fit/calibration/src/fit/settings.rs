@@ -34,8 +34,8 @@ pub struct FitSettings {
     pub serial: Text,
     /// Creation time, for the blob.
     pub created: Text,
-    /// Keep a fit that leaves most of the motion unexplained, or whose parameters the log leaves open;
-    /// else there is none.
+    /// Keep a fit that does not explain most of the motion, or with parameters that the log does not determine.
+    /// Without it such a fit is an error.
     pub force: bool,
 }
 

@@ -19,7 +19,7 @@ const LAG_ERRORS_MIN: f64 = 3.0;
 /// In a million rows of noise alone the largest error is five times the rms.
 const PEAK_TO_RMS_MAX: f64 = 8.0;
 
-/// Movements whose zero deviation is beyond its range, and rows that the decoder refuses.
+/// Movements with a zero deviation beyond its range, and rows that the decoder refuses.
 pub fn counted(zeros: &[ZeroDeviation], undecoded: usize) -> impl Iterator<Item = Finding> {
     let movements = zeros.iter().filter(|zero| zero.is_beyond).count();
     let deltas = zeros.iter().flat_map(|zero| zero.delta_m);

@@ -1,4 +1,4 @@
-//! The one judge of parameters: it takes rows as they come, movement after movement, and keeps sums.
+//! Judges parameters: takes row after row, movement after movement, and keeps sums.
 
 use super::Zeros;
 use super::statistics::{ErrorSums, PoseError};
@@ -28,7 +28,7 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// What a blob records of it, of a fit that used so many rows.
+    /// The record of the errors in the blob of a fit that used `train_rows` rows.
     pub fn record(&self, train_rows: u32) -> FitRecord {
         let axes = self.errors.axes;
         FitRecord {
@@ -74,7 +74,7 @@ pub struct Judge<'s> {
 }
 
 impl<'s> Judge<'s> {
-    /// Of so many logs.
+    /// A judge of a number of logs.
     pub fn new(parameters: &Parameters, stage: &'s Stage, logs: usize) -> Self {
         Self {
             parameters: *parameters,
@@ -85,8 +85,8 @@ impl<'s> Judge<'s> {
         }
     }
 
-    /// Takes the next row: the number of its log, that of its movement, whether this begins with it,
-    /// and what [`error`](super::error) says of it.
+    /// Takes the next row: number of its log, number of its movement, whether it begins the movement, and its
+    /// [`error`](super::error).
     pub fn take(
         &mut self,
         (log, index, begins): (usize, i64, bool),

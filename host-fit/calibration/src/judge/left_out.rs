@@ -14,11 +14,11 @@ pub struct RowPlace {
 /// The rows that were left out of account.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LeftOut {
-    /// How many.
+    /// Rows that were left out.
     pub rows: usize,
-    /// Of so many.
+    /// Rows in all.
     pub of: usize,
-    /// The first of them and the last.
+    /// The first and the last row that was left out.
     pub span: Option<(RowPlace, RowPlace)>,
 }
 

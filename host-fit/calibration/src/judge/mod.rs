@@ -40,7 +40,7 @@ use statistics::ErrorSums;
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Zeros<'z> {
-    /// None: the pose as the target gives it without a re-zero.
+    /// No zero deviation is taken off: the pose of the target without a re-zero.
     None,
     /// The closed-form one of each movement, over all its rows.
     Refit,
@@ -49,7 +49,7 @@ pub enum Zeros<'z> {
 }
 
 impl Zeros<'_> {
-    /// The way to judge a model as it was fitted: refitted where it has zero deviations.
+    /// Refitted for a model with zero deviations, else none.
     pub const fn of_model(model: &Model) -> Self {
         if model.has_zero_deviation {
             Self::Refit
@@ -110,8 +110,8 @@ impl Decoded {
         judge.judgement(zeros)
     }
 
-    /// The errors of movements that begin at rest, re-zeroed there as a stage is: less their mean over
-    /// the first `rest_s`, whose rows have none.
+    /// The errors of movements that begin at rest, less their mean over the first `rest_s`, as a stage is zeroed.
+    /// The rows at rest have no error.
     pub fn rezeroed(&self, dataset: &Dataset, rest_s: f64) -> Vec<Option<[f64; 3]>> {
         let mut errors = self.errors.clone();
         for movement in &dataset.movements {

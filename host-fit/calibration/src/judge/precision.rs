@@ -1,4 +1,4 @@
-//! What the target's `f32` costs: its poses beside those of the same model in `f64`.
+//! The rounding errors of the target: its poses in `f32` against the same model in `f64`.
 
 use hallstage_input::dataset::{Dataset, LoggedFrame};
 use rayon::prelude::*;

@@ -20,7 +20,7 @@ pub fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
 
 /// Mean power over windows with a Hann taper.
 pub struct Spectrum {
-    /// Mean squared magnitude of the transform, by bin; unit that of the values, squared.
+    /// Mean squared magnitude of the transform, by bin; the unit of the values, squared.
     pub power: Vec<f64>,
     windows: usize,
     length: usize,
@@ -75,7 +75,7 @@ impl Spectrum {
         (4.0 * excess.max(0.0) / (0.375 * (self.length * self.length) as f64)).sqrt()
     }
 
-    /// The lines from a bin on that are so many standard deviations of the noise's power above it.
+    /// The lines from a bin on: bins with a power this number of standard deviations above the noise.
     pub fn lines(&self, lowest: usize, deviations: f64) -> impl Iterator<Item = usize> {
         let limit = self.noise(deviations);
         let is_line = move |bin: &usize| {

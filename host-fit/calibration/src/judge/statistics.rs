@@ -67,7 +67,7 @@ impl ErrorSums {
         }
     }
 
-    /// With those of rows that follow.
+    /// Adds the sums of the rows that follow.
     pub fn add(&mut self, more: &Self) {
         self.rows += more.rows;
         self.undecoded += more.undecoded;

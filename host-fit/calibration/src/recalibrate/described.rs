@@ -1,17 +1,17 @@
-//! Does the change asked for explain the log of a recalibration?
+//! Does the change explain the log of a recalibration?
 
 use super::{Known, OPEN_MAX_ALL, RecalibrateError};
 use hallstage_solver::solve::field::update::{Change, Update};
 
-/// Chi-square may exceed that of the old log by this part, for the model is not exact ...
+/// Chi-square may be this part larger than for the old log, since the model is not exact.
 const MISFIT_MAX: f64 = 0.02;
-/// ... and by chance by this many standard deviations.
+/// Chi-square may be larger by chance, by this many standard deviations.
 const CHANCE_MAX: f64 = 3.0;
 /// The same for the changes in terms of what the prior allows for.
 const FAR_MAX: f64 = 4.0;
 
-/// Refuses a log whose residuals the change asked for does not explain, or not by a change that
-/// probes undergo.
+/// Refuses a log with residuals that the change does not explain, or that only a change far beyond the prior
+/// explains.
 pub(super) fn check_described(
     update: &Update,
     known: Option<&Known>,

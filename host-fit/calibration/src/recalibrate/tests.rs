@@ -25,7 +25,7 @@ const RUN: [f64; 6] = [5.0, 8.0, 7.0, 6.0, 4.0, 7.5];
 const SINE_ALONG_Y: [f64; 6] = [0.0, 4.0, 0.0, 0.0, 0.0, 0.0];
 const ALL_AXES: [f64; 6] = [3.0, 4.0, 5.0, 2.0, 3.5, 2.5];
 
-/// A sine of so many cycles along each axis; an axis of none stands still.
+/// A sine along each axis, with its number of cycles; an axis with 0 cycles stands still.
 fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
     const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
     let pose = |row: u32| {

@@ -12,7 +12,7 @@ pub enum Draw {
     #[default]
     Stratified,
     /// As the paper draws: any row with the same chance. Most draws of 200 rows out of 57
-    /// movements miss one, whose zero deviation then is free.
+    /// movements miss a movement; its zero deviation is then free.
     Plain,
 }
 

@@ -70,8 +70,8 @@ impl<'a> Problem<'a> {
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and
-    /// axes of the squared error (um, um, urad), from the sum of them. Of an exact fit
-    /// rounding may leave a sum below zero.
+    /// axes of the squared error (um, um, urad), from their sum `cost`.
+    /// Rounding may make the sum of an exact fit negative.
     pub fn fitness(&self, cost: f64) -> f64 {
         let cost = if cost < 0.0 { 0.0 } else { cost };
         (cost / (3.0 * self.rows.rows.len() as f64)).sqrt()

@@ -91,7 +91,7 @@ impl Model {
         MODEL_31.iter().enumerate().flat_map(of_term)
     }
 
-    /// Those that it fits.
+    /// The parameters that the model fits.
     pub fn free(&'static self) -> impl Iterator<Item = ParameterId> {
         self.parameters().take(3 * self.fitted)
     }

@@ -1,4 +1,4 @@
-//! Values of a model's parameters, and the box in which a fit searches for them.
+//! Values of a model's parameters, and their search ranges.
 
 use super::model::{COUNT, GAIN_TERMS, Model};
 use hallstage_input::stage::{Range, Stage};
@@ -55,7 +55,7 @@ impl Parameters {
         Self { values }
     }
 
-    /// Three neighbours of the list: those of A, B, C.
+    /// The values of A, B, C from a place in the list on.
     const fn three(&self, start: usize) -> [f64; 3] {
         let v = &self.values;
         [v[start], v[start + 1], v[start + 2]]
@@ -94,7 +94,7 @@ impl Parameters {
         [0, 1, 2].map(|probe| std::array::from_fn(|k| self.values[SLOPES + 3 * k + probe]))
     }
 
-    /// The sensitivities of Model (31), whose slopes are a, b, c.
+    /// The sensitivities of Model (31).
     pub fn sensitivity(&self) -> [Sensitivity<f64>; 3] {
         let (eta, slopes) = (self.eta(), self.slopes());
         [0, 1, 2].map(|probe| Sensitivity {

@@ -1,8 +1,8 @@
 //! A search on the fitness of a problem, with or without a least-squares finish.
 //!
 //! With a finish (the program's default, `shtlbo-lm`) the search runs on a few hundred rows, evenly
-//! from each movement, until it hardly improves; what it found is then a start of the
-//! least-squares fit on all rows. So the result is the least-squares optimum whatever the seed, and the search guards against a start that leads nowhere.
+//! from each movement, until it hardly improves. The least-squares fit on all rows then starts from its best
+//! individual. The result is the least-squares optimum for every seed; the search guards against a bad start.
 
 use super::field::least_squares;
 use super::objective::{Objective, best_delta_m};
@@ -26,8 +26,8 @@ const EXACT: Stall = Stall {
     relative_decline: 1e-7,
 };
 
-/// Np and Gm for a form if the user names none: those of the paper, except for `linear`, whose nine
-/// unknowns want a smaller population, and as many generations as it takes.
+/// Np and Gm for a form if the user names none: the paper's values, except for `linear`. Its nine unknowns want a
+/// smaller population and more generations.
 pub const fn default_size(projection: Projection) -> (usize, usize) {
     match projection {
         Projection::None | Projection::Delta => (100, 100),

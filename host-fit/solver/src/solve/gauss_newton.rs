@@ -1,7 +1,7 @@
-//! The one estimator: damped Gauss-Newton with a normal prior, for any model.
+//! The estimator: damped Gauss-Newton with a normal prior, for any model.
 //!
 //! A model gives its normal equations in its values v: sums of products of whitened derivatives and
-//! residuals. What may change is x, with v = origin + basis x and a prior of mean zero on x. A mask is
+//! residuals. The unknowns are x, with v = origin + basis x and a prior of mean zero on x. A mask is
 //! a basis of some unit vectors; an old covariance L L' is the basis L with the prior 1. Where x has
 //! ranges, it stays within them.
 
@@ -9,14 +9,14 @@ use hallstage_input::stage::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-/// Movements whose sums are held at once: 56 kB each.
+/// Movements with sums in memory at the same time: 56 kB each.
 const TOGETHER: usize = 64;
 /// A step is too small to count if it would lower the sum of squares by less than this part of it.
 const RELATIVE_GAIN_MIN: f64 = 1e-10;
 /// Near the minimum rounding decides: a rise of less than this is none.
 const RISE_MAX: f64 = 1e-3;
-/// A step that gains less of what it promises is followed by one with more damping, one that gains
-/// more than the rest of it by one with less.
+/// A step with a gain below this part of its promise is followed by a step with more damping, a step with a gain above
+/// the complement by one with less.
 const PROMISE_KEPT: f64 = 0.25;
 /// Damping of the first step after one that led uphill, or hardly down.
 const DAMPING_UPHILL: f64 = 1e-4;
@@ -51,8 +51,8 @@ impl<const W: usize> Normal<W> {
         }
     }
 
-    /// The sum over so many movements, in their order whatever the number of threads; `None` if one
-    /// of them cannot be evaluated.
+    /// The sum over `count` movements, in their order for any number of threads; `None` if a movement cannot be
+    /// evaluated.
     pub fn of_movements(
         count: usize,
         of_movement: impl Fn(usize) -> Option<Self> + Sync,
@@ -134,7 +134,7 @@ pub trait Equations<const W: usize> {
     fn normal(&self, at: &Point) -> Option<Normal<W>>;
 }
 
-/// What may change, and what is known of it.
+/// The unknowns and their prior.
 #[derive(Clone, Debug)]
 pub struct Unknowns {
     /// The values at x = 0.
@@ -148,7 +148,7 @@ pub struct Unknowns {
 }
 
 impl Unknowns {
-    /// Only some of the values, of which nothing is known.
+    /// Some of the values, with a flat prior.
     pub fn some(origin: DVector<f64>, free: &[usize]) -> Self {
         let unit = |row: usize, column: usize| f64::from(u8::from(free[column] == row));
         Self {
@@ -188,7 +188,7 @@ impl Unknowns {
     }
 
     /// The step from x to the least sum of squares that the curvature promises within the ranges:
-    /// what meets an end of its range is held there, and let go again if more than `enough` is gained
+    /// an unknown that meets an end of its range is held there, and released if more than `enough` is gained
     /// inwards (bounded-variable least squares, Stark and Parker 1995). `None` where the curvature
     /// is singular.
     fn step(
@@ -208,7 +208,7 @@ impl Unknowns {
         let mut step = DVector::zeros(x.len());
         let at_end = |k: usize| room(k)[0] >= 0.0 || room(k)[1] <= 0.0;
         let mut held: Vec<bool> = (0..x.len()).map(at_end).collect();
-        // Each round holds one more or lets one go; so many are enough but for rounding.
+        // Each round holds or releases one unknown. This number of rounds is enough but for rounding.
         for _ in 0..=3 * x.len() {
             let free: Vec<usize> = (0..x.len()).filter(|&k| !held[k]).collect();
             let of_held = DVector::from_fn(x.len(), |k, _| f64::from(u8::from(held[k])) * step[k]);
@@ -247,13 +247,13 @@ impl Unknowns {
         Some(step)
     }
 
-    /// The covariance of the values; `None` where the log and the prior leave a combination open.
+    /// The covariance of the values; `None` where log and prior do not determine a combination.
     pub fn covariance<const W: usize>(&self, normal: &Normal<W>) -> Option<DMatrix<f64>> {
         Some(&self.basis * self.factor(normal)?.inverse() * self.basis.transpose())
     }
 }
 
-/// The curvature along x, factored in the scale in which its diagonal is one.
+/// The curvature along x, scaled to a diagonal of ones and factored.
 #[derive(Clone, Debug)]
 pub struct Factor {
     scale: DVector<f64>,
@@ -265,7 +265,7 @@ impl Factor {
     pub fn new(curvature: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let scale = curvature.diagonal().map(|d| {
             let d = d.sqrt();
-            // What nothing shows stays as it is.
+            // An unknown without information is not changed.
             if d.is_normal() { 1.0 / d } else { 0.0 }
         });
         let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {

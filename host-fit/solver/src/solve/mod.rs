@@ -2,7 +2,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`gauss_newton`] | the one estimator: damped Gauss-Newton with a prior |
+//! | [`gauss_newton`] | the estimator: damped Gauss-Newton with a prior |
 //! | [`field`] | the models by it |
 //! | [`objective`] | the fitness as a cost function of a search |
 //! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
@@ -47,7 +47,7 @@ use std::time::{Duration, Instant};
 /// How much of the problem is solved in closed form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
-    /// Nothing: every zero deviation is an unknown of its own, within its range (the paper).
+    /// No part: every zero deviation is an unknown of its own, within its range (the paper).
     None,
     /// The zero deviations.
     Delta,
@@ -131,7 +131,7 @@ pub struct SolverOptions {
     pub population: usize,
     /// Generations of a population.
     pub generations: usize,
-    /// Known parameters to start from, such as those of an earlier blob.
+    /// Known parameters to start from, for example of an earlier blob.
     pub known: Option<Parameters>,
     /// Shows how far a search is, and can end it: it keeps the best so far.
     pub watch: Watch<'static>,

@@ -7,8 +7,8 @@
 //! or (k / r)^2 (the tail of Cauchy's loss). Weights and fit in turn until both settle: iteratively
 //! reweighted least squares.
 //!
-//! Noise alone does not come near k, so every row of a clean log has the weight 1 and
-//! the fit is that of least squares, bit for bit.
+//! Noise alone does not come near k, so every row of a clean log has the weight 1, and the result is that of plain
+//! least squares, bit for bit.
 
 use super::field::least_squares::solve;
 use super::field::pose::Decoder;
@@ -70,8 +70,8 @@ impl Loss {
         deviations(residuals, movements).map(weight).collect()
     }
 
-    /// The weights that a fit ends with: Cauchy's outliers are left out, and with them rows most of
-    /// whose neighbours are: while a stage is stuck, some poses come out right by chance.
+    /// The weights that a fit ends with: Cauchy's outliers are left out, and also rows among
+    /// outliers: while a stage is stuck, some poses are right by chance.
     pub fn last(self, weights: Vec<f64>) -> Vec<f64> {
         const BESIDE: usize = 5;
         let light = |weights: &[f64]| weights.iter().filter(|w| **w < HALF).count();
@@ -92,7 +92,7 @@ fn least_magnitudes(
     residuals: Vec<[f64; 3]>,
     movements: impl Iterator<Item = Range<usize>>,
 ) -> Vec<f64> {
-    // Those that happen to be near zero must not hold the fit.
+    // Residuals that happen to be near zero must not hold the fit.
     const NEAR: f64 = 0.5;
     let weight = |r: f64| NEAR / r.max(NEAR);
     deviations(residuals, movements).map(weight).collect()

@@ -1,8 +1,8 @@
 //! Rows of a log in mm and mrad, and short blocks of them.
 //!
 //! Neighbouring rows see nearly the same pose: the mean of a few rows' residuals and derivatives
-//! holds their information on the parameters, and is a tenth of the work for all that follows. No
-//! bias comes of it, for residuals and derivatives are those of each row.
+//! holds their information on the parameters, and is a tenth of the work for all that follows. The
+//! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
 use super::probe::{Probe, Reading};
 use super::terms::PER_PROBE;
@@ -48,7 +48,7 @@ pub struct FieldRow {
 /// The rows of a log that a fit uses, by movement and block.
 #[derive(Clone, Debug)]
 pub struct Rows {
-    /// The rows, those of a movement next to each other.
+    /// The rows, movement after movement.
     pub rows: Vec<FieldRow>,
     /// The blocks: rows of one movement that follow each other.
     pub blocks: Vec<Range<usize>>,

@@ -42,8 +42,8 @@ pub struct Service {
 }
 
 impl Service {
-    /// Of probes with this noise at poses X, Y, Rz and Z, Rx, Ry (m, rad); `None` where they can't
-    /// tell one.
+    /// Of probes with this noise at poses X, Y, Rz and Z, Rx, Ry (m, rad); `None` where the probes
+    /// do not determine a pose.
     pub fn new(
         parameters: &FieldParameters,
         white_mm: [f64; 3],
@@ -178,7 +178,7 @@ impl ServiceVariance {
         [0, 1, 2].map(|k| (1.0 + self.systematic[k] / self.noise[k]).sqrt())
     }
 
-    /// The systematic variance over that of the noise, of the axis where it is largest.
+    /// The largest ratio of systematic variance to variance of the noise over the axes.
     pub fn worst(&self) -> f64 {
         (0..3).fold(0.0, |worst, k| {
             f64::max(worst, self.systematic[k] / self.noise[k])
@@ -215,7 +215,8 @@ impl ServiceVariance {
         (0..3).any(|k| self.gains_in(k) && self.difference[k] > ROUNDING * self.noise[k])
     }
 
-    /// Whether its worst axis is better than that of Model (31), the difference less its own part of it.
+    /// Whether the worst axis is better than the worst axis of Model (31). The difference between the models is taken
+    /// less its systematic part.
     fn is_better(&self) -> bool {
         let of_31 = |k: usize| (self.difference[k] - self.systematic[k]) / self.noise[k];
         (0..3).any(|k| of_31(k) > self.worst())
@@ -242,7 +243,7 @@ impl Verdict {
         }
     }
 
-    /// Whether the log leaves an axis of the field model worse than Model (31).
+    /// Whether an axis of the field model is worse than of Model (31).
     pub fn loses(&self) -> bool {
         self.service.loses() && !self.by_resets
     }
@@ -257,7 +258,7 @@ impl std::fmt::Display for Verdict {
         if self.field {
             write!(
                 f,
-                "the field model: errors predicted over the range of the log are {field}, those of model (31) {}",
+                "the field model: errors predicted over the range of the log are {field}, and with model (31) {}",
                 words(model_31)
             )
         } else if self.loses() {

@@ -42,7 +42,7 @@ pub struct Lag {
 }
 
 impl<'s> Alignment<'s> {
-    /// Nothing is known but the design.
+    /// Only the design is known.
     pub fn new(stage: &'s Stage) -> Self {
         let designed = FieldParameters::of_model_31(&Parameters::designed(stage), stage);
         let mut origin = DVector::zeros(LAG_RATE + 1);
@@ -73,7 +73,7 @@ impl<'s> Alignment<'s> {
         }
     }
 
-    /// One step on rows whose reference is taken at the lag so far; `None` where they show nothing.
+    /// One step on rows with the reference at the lag found before; `None` where the rows do not show a lag.
     pub fn step(&mut self, rows: &Rows) -> Option<Lag> {
         let normal: Normal<COLUMNS> = self.equations(rows).normal(&self.point(rows))?;
         let factor = self.unknowns.factor(&normal)?;
@@ -98,7 +98,7 @@ impl<'s> Alignment<'s> {
         })
     }
 
-    /// The lag that some rows show by themselves, all else as it is, and its standard error, s.
+    /// The lag of some rows with all other unknowns fixed, and its standard error, s.
     pub fn own_lag_s(&self, rows: &Rows) -> Option<[f64; 2]> {
         let normal: Normal<COLUMNS> = self.equations(rows).normal(&self.point(rows))?;
         let information = normal.curvature(COUNT, COUNT);

@@ -6,7 +6,7 @@ use crate::problem::terms::shown;
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FieldFitError {
-    /// The log leaves the field model worse than Model (31).
+    /// The field model would be worse than Model (31).
     #[error("{0}")]
     NotCarried(Box<Verdict>),
     /// The normal equations can't be solved.

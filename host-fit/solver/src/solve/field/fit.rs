@@ -269,8 +269,8 @@ impl WhiteFit {
         })
     }
 
-    /// The posterior with k and h, and these themselves: what the rows were compensated with and what was
-    /// found beyond.
+    /// The posterior with k and h, and k and h: the values that the rows were compensated with plus the estimated
+    /// changes.
     fn with_warmth(&self, mut covariance: DMatrix<f64>) -> (Posterior, Warmth) {
         let mut temperature = self.temperature;
         for (k, beyond) in self.at.values.as_slice()[WARMTH..].iter().enumerate() {
@@ -355,7 +355,7 @@ impl WhiteFit {
     }
 
     fn descend(&mut self, limits: Limits) -> Result<Solved<COLUMNS>, FieldFitError> {
-        // The basis is that of the values themselves.
+        // The basis is the identity.
         let x = self.at.values.clone();
         let offsets = self.at.offsets.clone();
         let solved = gauss_newton::solve(&self.equations(), &self.unknowns, x, offsets, limits);

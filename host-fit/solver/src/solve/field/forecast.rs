@@ -9,7 +9,7 @@ use super::warmth::Sensors;
 use super::whiten::{FieldEquations, Noise};
 use nalgebra::DMatrix;
 
-/// What is to be expected of a fit to rows whose signals are not known yet.
+/// The errors to expect of a fit to rows with signals that are not known yet.
 #[derive(Clone, Debug)]
 pub struct Forecast {
     /// The posterior of the parameters.
@@ -36,7 +36,7 @@ pub struct Forecaster {
 }
 
 impl Forecaster {
-    /// For a stage of these parameters, of which E = p = 0, under this noise, in service within the
+    /// For a stage of these parameters, with E = p = 0, under this noise, in service within the
     /// largest magnitudes of X, Y, Rz and Z, Rx, Ry given (m, rad); `None` where its probes don't
     /// determine a pose there.
     pub fn new(

@@ -12,13 +12,13 @@ use hallstage_input::stage::{Range, Stage};
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::time::Duration;
 
-/// Rows on which starts are compared, and from whose fit that of all rows goes on.
+/// Rows on which starts are compared. The fit to all rows goes on from the fit to these.
 const START_ROWS: usize = 2000;
 const LIMITS: Limits = Limits {
     steps: 100,
     gain: 1e-9,
 };
-/// Fits at most in which the ranges of the lever arms follow the misalignments.
+/// Most fits until the ranges of the lever arms, which follow from the misalignments, settle.
 const ROUNDS_MAX: usize = 20;
 
 /// Least squares on all rows, from the best of the regression and the given starts; of a model
@@ -43,7 +43,8 @@ fn ranges(problem: &Problem, theta: [f64; 3], within: bool) -> [Range; COUNT] {
     ranges
 }
 
-/// Parameters in their ranges: the misalignments first, from which those of the lever arms follow.
+/// Parameters clipped to their ranges. The ranges of the lever arms follow from the misalignments, so these come
+/// first.
 fn clipped(problem: &Problem, parameters: &Parameters, within: bool) -> Parameters {
     let mut clipped = *parameters;
     for start in [THETA, 0] {

@@ -30,7 +30,7 @@ pub fn point_of(p: &Parameters) -> Option<Point> {
     })
 }
 
-/// The parameters of a point: G^-1 = diag(eta) PM, whose rows give eta, misalignment and lever
+/// The parameters of a point: the rows of G^-1 = diag(eta) PM give eta, misalignment and lever
 /// arm of each probe. `None` where G is singular. Each theta comes out within a quarter turn of the
 /// designed one.
 pub fn parameters_of(point: &Point, stage: &Stage) -> Option<Parameters> {

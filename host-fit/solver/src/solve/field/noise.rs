@@ -15,8 +15,8 @@ const SPAN_S: f64 = 1.0;
 /// A span shorter than this part of [`SPAN_S`] is left out.
 const PART_MIN: f64 = 0.5;
 
-/// White noise of the probes A, B, C, mm: from second differences of the residuals, whose
-/// variance is six times that of the noise, at least what rounding to codes leaves.
+/// White noise of the probes A, B, C, mm: from second differences of the residuals, which have six times the
+/// variance of the noise. It is at least the rounding of the codes.
 /// Rows below half weight are left out.
 pub fn white_mm(
     rows: &Rows,
@@ -51,7 +51,7 @@ struct Span {
     by_unknown: [[f64; UNKNOWNS]; 3],
 }
 
-/// What the reference of a stage like those at hand walks in a second in X, Y, Rz: mm, mm, mrad.
+/// Usual walk of a reference in a second in X, Y, Rz: mm, mm, mrad.
 pub const USUAL_DRIFT_MM: [f64; 3] = [1e-4; 3];
 /// Standard deviation of the logarithm of a walk, before a log is seen: a factor of two.
 pub const DRIFT_SPREAD: f64 = 0.7;
@@ -60,7 +60,7 @@ pub const DRIFT_SPREAD: f64 = 0.7;
 /// between means of neighbouring spans of a second, with what the fitted parameters took of them
 /// (by their `covariance`) put back.
 ///
-/// A short log has few spans, from which the walk is known within a factor of two. Standard errors
+/// A short log has few spans and determines the walk within a factor of two. Standard errors
 /// are honest on average with the mean of the walk's variance over all values that the spans
 /// allow, not with the most likely one, which is often zero.
 pub fn drift_mm(
@@ -81,8 +81,8 @@ pub fn drift_mm(
                 differences.push(Difference {
                     square: error * error + quadratic(covariance, &by),
                     white: a.white[axis] / a.rows + b.white[axis] / b.rows,
-                    // Means over neighbouring spans of a walk differ by 2/3 of what it does from
-                    // the middle of one to that of the other.
+                    // The variance between means over neighbouring spans of a walk is 2/3 of the variance
+                    // between their middles.
                     seconds: (b.time_s - a.time_s) * 2.0 / 3.0,
                 });
             }
@@ -94,9 +94,9 @@ pub fn drift_mm(
 /// The difference between two spans.
 struct Difference {
     square: f64,
-    /// Its variance by white noise.
+    /// Variance by white noise.
     white: f64,
-    /// Over that of a walk in a second.
+    /// The variance by the walk over the variance of the walk in a second, s.
     seconds: f64,
 }
 

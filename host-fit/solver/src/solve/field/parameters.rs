@@ -27,7 +27,7 @@ pub struct FieldParameters {
 
 /// Change of a probe's sensitivity with height, as a part of it, 1/m: 215 to 237 in the given logs.
 pub const FALL_PER_M: f64 = -226.0;
-/// A probe whose sensitivity changes by less than this, 1/m, stands where the drawing has it.
+/// A probe with a smaller change of sensitivity, 1/m, is taken to stand at its designed place.
 const SLOPE_MIN: f64 = 5.0;
 /// How far a probe stands from its designed place along X and Y, standard deviation, m.
 pub(super) const PLACE_M: f64 = 0.03;
@@ -65,7 +65,7 @@ impl FieldParameters {
         }
     }
 
-    /// Those that a blob carries; `None` for another model.
+    /// The parameters in a blob; `None` for another model.
     pub fn of_set(set: &ParameterSet, stage: &Stage) -> Option<Self> {
         Some(Self {
             probes: values_of(set)?,
@@ -211,8 +211,8 @@ fn sensitivity(values: &[f64; PER_PROBE]) -> Sensitivity<f64> {
     }
 }
 
-/// The decoder's coefficients of p over those in mm: for u, w and p in units of `m_per_unit` and
-/// for zr = eta z in place of z.
+/// Factors from the coefficients of p in mm to the decoder's coefficients, for u, w and p in units of `m_per_unit`
+/// and for zr = eta z in place of z.
 fn shape_scale(eta: f64, m_per_unit: f64) -> [f64; SHAPE] {
     let mm_per_unit = m_per_unit * 1e3;
     std::array::from_fn(|place| {
@@ -244,8 +244,7 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
 /// Standard deviation of a temperature coefficient that stays at its prior, 1/K.
 pub const HELD: f64 = 1e-9;
 
-/// All parameters, the lag, k and h, with what is known of them before a log is seen; `warmth` are the
-/// standard deviations of k and h.
+/// All parameters, the lag, k and h with their prior; `warmth` are the prior standard deviations of k and h.
 pub fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {

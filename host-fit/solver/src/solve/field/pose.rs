@@ -24,7 +24,7 @@ pub const LAG: usize = COUNT;
 /// Place of the residual.
 pub const ERROR: usize = COUNT + 1;
 
-/// Rows whose phi is smaller than this part of eta are next to a pole, and so are the parameters.
+/// A row with phi below this part of eta is next to a pole.
 pub const SHARE_MIN: f64 = 0.05;
 
 /// The error of a row's pose in the last column, and the derivatives of the decoded pose: um, um, urad

@@ -19,7 +19,7 @@ pub const CORRELATION_SHOWN: f64 = 0.95;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// Covariance of the 81 parameters, in their order and units, and then, where the stage has sensors
-    /// of temperature, of (k, h) of A, B, C, 1/K. Of Models (12) to (31) only that of `determined`.
+    /// of temperature, of (k, h) of A, B, C, 1/K. For Models (12) to (31) the covariance of `determined`.
     pub covariance: DMatrix<f64>,
     /// Which parameters these are, by their places among the 81 and k and h.
     pub determined: Vec<usize>,
@@ -132,7 +132,7 @@ impl Posterior {
         }
     }
 
-    /// The same about other parameters with a covariance of their own; that of k and h stays.
+    /// The posterior of other parameters with a covariance of their own; the covariance of k and h is kept.
     #[must_use]
     pub fn with_parameters(&self, parameters: &FieldParameters, covariance: &DMatrix<f64>) -> Self {
         let (of_parameters, all) = (covariance.nrows(), self.covariance.nrows());
@@ -156,8 +156,7 @@ impl Posterior {
         named.collect()
     }
 
-    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_SHOWN`] either way, the
-    /// strongest first, with their correlation.
+    /// Pairs of parameters with a correlation above [`CORRELATION_SHOWN`] or below its negative, the strongest first.
     pub fn correlations_shown(&self) -> Vec<(String, String, f64)> {
         let pairs = self.strongest_correlations(usize::MAX).into_iter();
         pairs
@@ -165,8 +164,7 @@ impl Posterior {
             .collect()
     }
 
-    /// The same with k and h, whose covariance with themselves and with the parameters is in
-    /// `with_lag`: that of all unknowns.
+    /// The posterior with k and h; `with_lag` is the covariance of all unknowns.
     #[must_use]
     pub(super) fn with_warmth(mut self, with_lag: &DMatrix<f64>) -> Self {
         self.covariance = with_lag.clone().remove_row(COUNT).remove_column(COUNT);
@@ -179,7 +177,7 @@ impl Posterior {
         std::array::from_fn(|k| self.covariance[(k, k)].sqrt())
     }
 
-    /// Those of the parameters that Model (31) has too, in the order and the units of
+    /// Standard errors of the parameters of Model (31), in the order and the units of
     /// [`Parameters`](crate::problem::parameters::Parameters).
     pub fn standard_errors_31(&self) -> [Option<f64>; model::COUNT] {
         std::array::from_fn(|k| {
@@ -262,7 +260,7 @@ mod tests {
     use runtime::VerticalPose;
 
     /// A small error of one parameter at a time, decoded, against what is predicted for it; the
-    /// decoder's one step leaves up to some thousandths of its effect.
+    /// decoder's one step is wrong by up to some thousandths of the effect.
     #[test]
     fn the_predicted_error_of_a_pose_is_what_the_decoder_makes_of_the_parameters_error() {
         let truth = parameters();

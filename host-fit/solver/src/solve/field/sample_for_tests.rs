@@ -59,7 +59,7 @@ pub(super) struct Run {
     pub(super) white_m: f64,
     /// Walk of the reference in X, Y (m) and Rz (rad) in a second.
     pub(super) drift: [f64; 3],
-    /// Rows by which the reference lags.
+    /// Lag of the reference, rows.
     pub(super) lag_rows: usize,
     /// Whether Z, Rx, Ry stand still in each movement, at other places in each.
     pub(super) still: bool,
@@ -68,7 +68,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// The designed run of 8 s, with the noise of the stages at hand.
+    /// The designed run of 8 s, with the noise of the simulated stages.
     pub(super) const EIGHT_SECONDS: Self = Self {
         movements: 1,
         seconds: 8.0,

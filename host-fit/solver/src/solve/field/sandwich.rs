@@ -3,8 +3,8 @@
 //! The residuals of neighbouring rows are not independent: the interferometers drift. So the
 //! covariance is the sandwich A^-1 M A^-1 with M summed over clusters of rows that may depend on
 //! each other: whole movements where there are at least 20, else blocks of half a second within
-//! them. Where independence would give the larger figure that one is taken,
-//! so that a chance cancellation within few clusters promises nothing.
+//! them. The standard error as if rows were independent is a lower
+//! bound, so that a chance cancellation within few clusters does no harm.
 
 use super::parameters::FieldParameters;
 use super::pose::{COLUMNS, Columns, Decoder, ERROR, LAG};
@@ -44,8 +44,8 @@ pub struct Sandwich {
     /// Of the parameters that have a standard error. The model does not fit the others, or the log does
     /// not determine them; none has one where there are fewer clusters than parameters.
     pub posterior: Posterior,
-    /// Standard errors if rows were independent: what the log's motion alone allows, whatever the model
-    /// leaves unexplained. Zero where there is none.
+    /// Standard errors as if rows were independent: the limit by the motion of the log alone. Zero for a parameter that
+    /// is not fitted.
     pub motion_error: [f64; LAG],
     /// Parameters that the log does not determine: no motion shows them, or only in combination
     /// with others.
@@ -103,7 +103,7 @@ impl Sandwich {
 }
 
 impl Errors {
-    /// The larger of both; `None` of what the log does not determine.
+    /// The larger of both; `None` for an unknown that the log does not determine.
     fn standard_error(&self, k: usize) -> Option<f64> {
         let largest = self.independent[k].max(self.clustered[k]?);
         (!self.undetermined.contains(&k) && largest.is_finite()).then_some(largest)

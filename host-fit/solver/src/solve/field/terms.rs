@@ -6,7 +6,7 @@ use runtime::model::Shape;
 pub const PER_PROBE: usize = 27;
 /// Parameters of the model.
 pub const COUNT: usize = 3 * PER_PROBE;
-/// The first parameters of a probe are those of Model (31); these are beyond it.
+/// The first parameters of a probe belong to Model (31); from this place on they do not.
 pub const BEYOND_MODEL_31: usize = CARRY;
 /// The monomials of p.
 pub const SHAPE: usize = 18;
@@ -31,7 +31,7 @@ pub struct Term {
     pub name: &'static str,
     /// Its unit: SI for all but the coefficients of p, which take u, w and p in mm.
     pub unit: &'static str,
-    /// Standard deviation of the prior, whose mean is zero; `None` for a flat one.
+    /// Standard deviation of the prior about zero; `None` for a flat prior.
     pub prior: Option<f64>,
     /// Powers of u, w and z in the monomial; zeros for what is not a coefficient of p.
     pub powers: [u8; 3],
@@ -96,8 +96,7 @@ pub fn name(index: usize) -> String {
     format!("{}_{probe}", TERMS[index % PER_PROBE].name)
 }
 
-/// The names of the rows of a covariance: those of all parameters, and where it has more rows those of
-/// (k, h) of A, B, C.
+/// The names of the rows of a covariance: all parameters, then (k, h) of A, B, C if it has more rows.
 pub fn names(rows: usize) -> Vec<String> {
     let warmth = ["k_a", "h_a", "k_b", "h_b", "k_c", "h_c"].map(str::to_owned);
     (0..COUNT).map(name).chain(warmth).take(rows).collect()

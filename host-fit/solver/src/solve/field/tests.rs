@@ -1,4 +1,4 @@
-//! The whole fit on logs whose truth is known.
+//! The whole fit on logs with known truth.
 
 use super::error::FieldFitError;
 use super::fit::{FieldFit, fit_field};
@@ -140,7 +140,7 @@ fn a_stage_that_is_model_31_keeps_it() {
     assert!(!fit.figures.verdict.field, "{}", fit.figures.verdict);
 }
 
-/// Two runs, the second at a mount that is 5 K warmer, of magnets whose k differ.
+/// Two runs, the second with a mount that is 5 K warmer. The magnets differ in k.
 fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
     let run = Run {
         movements: 2,
@@ -255,7 +255,7 @@ fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
     for (probe, truth) in truth.into_iter().enumerate() {
         let (k, error) = (temperature.per_mk[probe][0] * 1e3, errors[probe][0]);
         assert!(
-            // The noise of the runs alone would leave 4.2e-6 to 5.0e-6.
+            // By the noise of the runs alone it would be 4.2e-6 to 5.0e-6.
             error > 5.3e-6 && error < 1e-5 && (k - truth).abs() < 3.5 * error,
             "{k:e} {truth:e} {error:e}"
         );

@@ -19,7 +19,7 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// What may have changed since the old log.
+/// A change since the old log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// The gain of all probes in common, as the temperature of magnets and amplifiers changes it.
@@ -28,11 +28,11 @@ pub enum Change {
     Gains,
     /// Anything: also the place and the height of each probe, and the shape of its field.
     All,
-    /// Nothing: the log adds to what is known, above all of k and h.
+    /// No parameter has changed: the log adds information, above all on k and h.
     Temperature,
 }
 
-/// Standard deviations of what may have changed.
+/// Standard deviations of the changes.
 ///
 /// A gain scales eta, a, b and c alike. Beyond it a probe that was taken off and seated again is
 /// elsewhere by some tenths of a millimetre and turned by up to a degree; its slopes follow the
@@ -111,7 +111,7 @@ fn seating(probe: usize, values: &[f64; PER_PROBE]) -> Vec<[f64; COUNT]> {
     columns
 }
 
-/// The parameters after a log, with what it says of them.
+/// The parameters after a log, with their posterior.
 #[derive(Clone, Debug)]
 pub struct Update {
     /// The parameters.
@@ -148,10 +148,9 @@ impl Update {
     }
 }
 
-/// Fits what has changed to all rows of a dataset, whose signals are compensated as the old calibration
-/// has it. `covariance` is the old [`Posterior::covariance`];
-/// without one the parameters that don't change stay as they are. `drift_mm` is the walk of the
-/// reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds don't determine it.
+/// Fits the change to all rows of a dataset. The signals are compensated by k and h of the old calibration.
+/// `covariance` is the old [`Posterior::covariance`]; without it the other parameters are fixed. `drift_mm` is the
+/// walk of the reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds do not determine it.
 ///
 /// # Errors
 /// [`FieldFitError::Singular`] where a number is not finite or
@@ -193,7 +192,7 @@ pub fn update(
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {
-        // Errors of temperatures are those of this log. The lag stands behind them.
+        // The errors of the temperatures belong to this log only. Their column is the last but the lag.
         lasting.column_mut(changes - 2).fill(0.0);
     }
     let inverse = unknowns
@@ -232,7 +231,7 @@ fn factor(
     let known = covariance.map_or(0, DMatrix::nrows);
     let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + 1);
     if let Some(covariance) = covariance {
-        // In the scale in which the diagonal is one: the units differ by orders of magnitude.
+        // Scaled to a diagonal of ones: the units differ by orders of magnitude.
         let scale = covariance.diagonal().map(f64::sqrt);
         let scaled = DMatrix::from_fn(known, known, |i, j| {
             covariance[(i, j)] / (scale[i] * scale[j])

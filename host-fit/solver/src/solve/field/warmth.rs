@@ -13,22 +13,22 @@ use std::ops::Range;
 pub struct Warmth {
     /// k, h and T0.
     pub temperature: Temperature<f64>,
-    /// Standard errors of (k, h) of A, B, C, 1/K; those of the prior where the log determines nothing.
+    /// Standard errors of (k, h) of A, B, C, 1/K; from the prior where the log does not determine them.
     pub error_per_k: [[f64; 2]; 3],
     /// The spans of the temperatures of mount and body that determine k and h, K; 0 where only the prior does.
     pub spans_k: [f64; 2],
 }
 
-/// A single log that spans less than this does not determine k, K: its drift is also that of the reference.
+/// A single log with a smaller span, K, does not determine k: the reference drifts as well.
 const SPAN_MIN_K: f64 = 2.0;
-/// Error of a log's gain by those of its temperatures: of two logs it puts k off by 4e-5 over their
-/// distance in K.
+/// Error of a log's gain by the errors of its temperatures. With two logs the error of k is 4e-5 over their distance
+/// in K.
 pub(super) const OF_SENSORS: f64 = 2.8e-5;
 
-/// Errors of k and of h by what the form leaves, 1/K: expansion moves a probe over its magnet, where the
-/// field differs. Standard deviations over simulated stages where one temperature changes, ...
+/// Errors of k and of h by the form of the model, 1/K: expansion moves a probe over its magnet, where the field
+/// differs. Standard deviation over simulated stages where one temperature changes.
 const OF_FORM: f64 = 3.5e-5;
-/// ... and of their sum, where both change alike and stage and framework grow together.
+/// The same for their sum, where both change alike and stage and framework grow together.
 const OF_FORM_TOGETHER: f64 = 1.3e-5;
 
 /// The sensors of temperature of some logs.
@@ -45,7 +45,7 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Those of a dataset.
+    /// The sensors of a dataset.
     pub fn new(dataset: &Dataset, stage: &Stage) -> Self {
         let prior_per_k = stage.temperature.prior_per_k;
         Self {
@@ -64,9 +64,8 @@ impl Sensors {
         })
     }
 
-    /// Completes the covariance of k and h, which stand at the end of a fit's: by errors of the sensors,
-    /// one for each log and the same for all probes, by those of the form, and by the prior where they
-    /// were held in the fit. The gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
+    /// Completes the covariance of k and h, the last rows of a fit's covariance. It adds the errors of the sensors (one
+    /// for each log, the same for all probes) and of the form, and takes the prior where they were held in the fit. The gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
     /// square of a row's signal over its noise.
     pub(super) fn complete(&self, covariance: &mut DMatrix<f64>, signal_to_noise: f64) {
         let along = |change_k: [f64; 2]| Vector3::new(1.0, change_k[0], change_k[1]);
@@ -109,8 +108,8 @@ impl Sensors {
     }
 }
 
-/// The range of a log that spans enough, else of the means of several logs; 0 where errors of the sensors
-/// would leave a coefficient less certain than before, `deviation`.
+/// The range of a log that spans enough, else of the means of several logs. 0 where the errors of the sensors are
+/// too large to improve on the prior, `deviation`.
 fn span_k(dataset: &Dataset, sensor: usize, deviation: f64) -> f64 {
     let of_logs = || dataset.logs.iter().map(|log| log.rows.clone());
     let range_k = |ends: Option<[i32; 2]>| ends.map_or(0.0, |[a, b]| f64::from(b - a) * 1e-3);

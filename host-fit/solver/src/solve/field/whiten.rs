@@ -58,8 +58,8 @@ impl FieldEquations<'_> {
         parameters
     }
 
-    /// How far from zero the offset of a movement may start, and what is expected of it beyond one that is
-    /// taken off already, mm, mm, mrad.
+    /// Standard deviation of the offset of a movement before it is seen, and its mean beyond the offset that is taken off
+    /// already, mm, mm, mrad.
     fn start(&self, offset_mm: [f64; 3]) -> [[f64; 3]; 2] {
         match self.resets_mm {
             Some(resets_mm) => [resets_mm, offset_mm.map(|x| -x)],
@@ -263,7 +263,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
-/// The lower factor of a covariance; what rounding makes negative counts as next to nothing.
+/// The lower factor of a covariance. A pivot that rounding makes negative counts as the smallest number.
 fn cholesky(m: &Matrix) -> Matrix {
     let root = |x: f64| x.max(f64::MIN_POSITIVE).sqrt();
     let a = root(m[0][0]);

@@ -159,8 +159,7 @@ impl<'a> Objective<'a> {
     }
 
     /// The zero deviations that an individual holds, m for each movement of the log, zero for
-    /// movements without rows, whose unknowns act on nothing; `None` in the forms that solve for
-    /// them.
+    /// movements without rows; `None` in the forms that solve for them.
     pub fn own_delta_m(&self, individual: &[f64]) -> Option<Vec<[f64; 3]>> {
         if self.projection != Projection::None {
             return None;

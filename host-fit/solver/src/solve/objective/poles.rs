@@ -2,8 +2,8 @@
 //!
 //! The boxes of Table 5 are wide: phi = eta + a Z + b Rx + c Ry passes through zero inside them
 //! (|b| near 1,740 /rad at a tilt of 500 urad), and beyond a pole a probe would read backwards
-//! at one end of the log. Such parameters are worthless, yet each pole parts the box into
-//! basins of their own, in which a search gets stuck. So the forms `delta` and `linear` keep to
+//! at one end of the log. Such parameters are worthless, and each pole parts the box into
+//! basins where a search gets stuck. So the forms `delta` and `linear` keep to
 //! the side where the stage is: every row must have phi / eta above [`SHARE_MIN`], else the cost
 //! is NaN; and the range of each slope is cut where it alone would break that rule. The form
 //! `none` is the paper's and has neither.
@@ -19,8 +19,8 @@ pub fn slope_extent(rows: &[FieldRow]) -> [Range; 3] {
     [0, 1, 2].map(|k| Range::around(rows.iter().map(|row| row.vertical[k]).chain([0.0])))
 }
 
-/// The part of `slopes` (a, b or c) in which, while the other slopes are zero, `eta` + slope v is
-/// above [`SHARE_MIN`] times eta over the extent. A range without such a part stays as it is.
+/// The part of `slopes` (a, b or c) where `eta` + slope v is above [`SHARE_MIN`] times eta over the extent, with the
+/// other slopes zero. A range without such a part is returned unchanged.
 pub fn cut(slopes: Range, eta: f64, extent: Range) -> Range {
     // eta (1 - SHARE_MIN) + slope v > 0 at both ends of the extent.
     let room = (1.0 - SHARE_MIN) * eta.abs();

@@ -47,7 +47,7 @@ pub fn truth() -> Parameters {
     )
 }
 
-/// A log of so many movements of so many rows each: a vertical pose of its own for every three, a zero
+/// A log of `movements` with `rows` each: a vertical pose of its own for every three, a zero
 /// deviation of up to 4 um, noise of 0.5 um.
 pub fn dataset(movements: usize, rows: usize) -> Dataset {
     let vertical = |k: usize| {

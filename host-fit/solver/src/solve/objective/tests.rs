@@ -100,7 +100,7 @@ fn the_full_form_equals_the_runtimes_model() {
 #[test]
 fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
     let (mut stage, dataset) = (stage(), dataset(7, 5));
-    // Half of what the log has.
+    // Half of the zero deviations in the log.
     stage.search.delta_m = Range {
         low: -2e-6,
         high: 2e-6,
@@ -252,7 +252,7 @@ fn whatever_lies_beyond_a_pole_costs_nan() {
     let cost = objective(&problem, Projection::Linear);
     let sound = cost.individual(&truth());
     assert!(cost.cost(&sound) < 3.0);
-    // a / eta of A that leaves the first row a share of 0.06, 0.04, -0.5 of eta.
+    // a / eta of A with phi / eta of 0.06, 0.04, -0.5 in the first row.
     let [z, rx, ry] = problem.rows.rows[0].vertical;
     let at_share = |share: f64| {
         let mut individual = sound.clone();
