@@ -11,7 +11,7 @@
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
 //! | [`diff`] | what changed between two blobs |
-//! | [`bus`] | the stage on a CAN bus: decoded as it comes, played from a log, made into a log |
+//! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, made into a log |
 //! | [`cli`] | the commands |
 #![forbid(unsafe_code)]
 
