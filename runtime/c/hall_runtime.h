@@ -94,7 +94,7 @@
 // Z, Rx, Ry are the last valid ones, repeated.
 #define HALL_STATUS_VERTICAL_HELD (1 << 16)
 
-// One or more servo periods had no frame before this one.
+// One or more servo periods before this frame had no frame.
 #define HALL_STATUS_FRAMES_MISSED (1 << 17)
 
 // The frame repeats an earlier sequence number.
@@ -103,7 +103,7 @@
 // A zero deviation is subtracted from X, Y, Rz. No fault.
 #define HALL_STATUS_ZERO_SET (1 << 19)
 
-// A temperature is missing or implausible: decoded as if at that of the calibration.
+// A temperature is missing or implausible: decoded as if at T0 of the calibration.
 #define HALL_STATUS_TEMPERATURE_MISSING (1 << 20)
 
 // In place of a code that could not be read. No converter gives it, and it lies below
@@ -136,7 +136,7 @@ enum HallResult
   HALL_RESULT_BAD_PAYLOAD = 8,
   // A parameter is NaN or infinite, a matrix singular, or the like.
   HALL_RESULT_UNUSABLE_PARAMETERS = 9,
-  // The blob belongs to another stage than the one expected.
+  // The blob belongs to another stage than expected.
   HALL_RESULT_OTHER_STAGE = 10,
   // The decoder was never loaded.
   HALL_RESULT_NOT_LOADED = 11,
@@ -157,7 +157,7 @@ enum HallRezero
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-  // None was asked for.
+  // No re-zero was asked for.
   HALL_REZERO_IDLE = 0,
   // It runs.
   HALL_REZERO_RUNNING = 1,
@@ -245,11 +245,11 @@ typedef struct {
 typedef struct {
   // Ticks, with and without a frame.
   uint32_t ticks;
-  // Ticks whose planar pose was invalid.
+  // Ticks with an invalid planar pose.
   uint32_t planar_invalid;
-  // Ticks whose vertical pose was invalid.
+  // Ticks with an invalid vertical pose.
   uint32_t vertical_invalid;
-  // Ticks in which a value was held.
+  // Ticks with a held value.
   uint32_t held;
   // Servo periods that had no frame.
   uint32_t frames_missed;
@@ -273,7 +273,7 @@ HALL_NODISCARD bool hall_arithmetic_is_sound(void);
 
 // Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 // and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
-// NULL to take that of any. Unless the result is HALL_RESULT_OK, the decoder stays as it was.
+// NULL to take any stage. Unless the result is HALL_RESULT_OK, the decoder is unchanged.
 //
 // # Safety
 // `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
@@ -286,11 +286,11 @@ HallResult hall_load(const uint8_t *memory,
 
 // Starts a servo: no zero deviation, nothing to hold, all counters zero. What is invalid is
 // held for `hold_ticks` ticks in a row, and zero after that. Unless the result is
-// HALL_RESULT_OK, the servo stays as it was.
+// HALL_RESULT_OK, the servo is unchanged.
 //
 // # Safety
 // `decoder` is NULL, or memory that was zero before hall_load filled it or failed to; once it is
-// filled, it stays as it is, and where it is, for as long as the servo is used.
+// filled, it is neither changed nor moved while the servo is used.
 HALL_NODISCARD
 HallResult hall_servo_start(HallServo *servo,
                             const HallDecoder *decoder,
@@ -300,7 +300,7 @@ HallResult hall_servo_start(HallServo *servo,
 // six fields of the reading are 0 and marked invalid.
 HallResult hall_tick(HallServo *servo, const HallFrame *frame, HallReading *reading);
 
-// One servo period in which no frame came: values are held or zero. Unless the result is
+// One servo period without a frame: values are held or zero. Unless the result is
 // HALL_RESULT_OK, all six fields of the reading are 0 and marked invalid.
 HallResult hall_tick_without_frame(HallServo *servo, HallReading *reading);
 
@@ -308,7 +308,7 @@ HallResult hall_tick_without_frame(HallServo *servo, HallReading *reading);
 HallResult hall_forget(HallServo *servo);
 
 // Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
-// movement and of the zero deviation; hall_rezero_state tells how it goes.
+// movement and of the zero deviation; hall_rezero_state reports the progress.
 HallResult hall_rezero_start(HallServo *servo, uint16_t ticks);
 
 // Where the re-zero stands; idle for a null pointer or a servo that was never started.

@@ -16,7 +16,7 @@ fn converters(period: u32) -> RawFrame {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("use: tracker params.bin")?;
-    // Once, at start: the arithmetic is that of the host, and the parameters are sound.
+    // Once, at start: this machine rounds as the host does, and the parameters are sound.
     runtime::arithmetic::check()?;
     let decoder = ParameterSet::from_bytes(&std::fs::read(path)?)?.decoder();
     let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 3 });

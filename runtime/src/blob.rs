@@ -44,14 +44,14 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 
 /// First bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"HALL";
-/// The newest layout that this version reads: that with temperatures. See
+/// The newest layout that this version reads, with temperatures. See
 /// [`ParameterSet::layout_version`].
 pub const LAYOUT_VERSION: u16 = 3;
 /// Bytes before the payload.
 pub const HEADER_BYTES: usize = 12;
 /// Bytes of the check after the payload.
 pub const CRC_BYTES: usize = 4;
-/// The largest blob, within the length up to which CRC-32C finds any five flipped bits.
+/// The largest blob. Up to this length CRC-32C finds any five flipped bits.
 pub const MAX_BYTES: usize = 656;
 
 /// CRC-32C without a table: a blob is read once, at start, and flash is short.
@@ -116,7 +116,7 @@ pub enum BlobError {
     /// The parameters are readable but unusable.
     #[error("unusable parameters: {0}")]
     Parameters(#[source] ParameterError),
-    /// The blob belongs to another stage than the one expected.
+    /// The blob belongs to another stage than expected.
     #[error("the parameters belong to another stage")]
     OtherStage,
     /// The buffer to write into is too small.
@@ -160,7 +160,7 @@ impl ParameterSet {
     /// Writes the blob into `buffer` ([`MAX_BYTES`] always suffice) and gives its bytes.
     ///
     /// # Errors
-    /// [`BlobError::BufferTooSmall`]. The set is written as it is: [`ParameterSet::check`] it.
+    /// [`BlobError::BufferTooSmall`]. The set is not checked: see [`ParameterSet::check`].
     pub fn to_bytes<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], BlobError> {
         let bytes = buffer.len();
         let too_small = BlobError::BufferTooSmall { bytes };

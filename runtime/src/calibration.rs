@@ -58,8 +58,8 @@ pub struct Calibration {
     pub model: ModelKind,
     /// Lever arms and misalignments of the probes A, B, C.
     pub geometry: ProbeGeometry<f64>,
-    /// The model's coefficients of the probes A, B, C. Those of the field model have
-    /// `hall_m_per_code` and `geometry` in them, see [`FieldProbe`](crate::model::FieldProbe).
+    /// The model's coefficients of the probes A, B, C. The coefficients of the field model contain
+    /// `hall_m_per_code` and `geometry`, see [`FieldProbe`](crate::model::FieldProbe).
     pub probes: Probes<f64>,
     /// Designed displacement per Hall code, m.
     pub hall_m_per_code: f64,

@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn signs_follow_the_right_hand_rule() {
-        // +Ry lowers the probe on +X and raises the one on -X.
+        // +Ry lowers the probe on +X and raises the probe on -X.
         let [z, rx, ry] = vertical([-12e-6, 12e-6, 0.0]);
         assert!((ry - 1e-4).abs() < 1e-18 && z.abs() < 1e-20 && rx.abs() < 1e-18);
         // +Rx lowers the probe on -Y.

@@ -57,8 +57,8 @@ pub struct Reading {
 
 /// Decodes frames by one calibration, whatever its model.
 ///
-/// A [`Decoder`] does this for its own model, an [`AnyDecoder`] for that of a parameter set, and
-/// a reference for what it refers to.
+/// A [`Decoder`] does this for its own model, an [`AnyDecoder`] for the model of a parameter set, and
+/// a reference for its decoder.
 pub trait Decode: Sync {
     /// The vertical pose of a frame's capacitive codes and the planar pose of its Hall codes,
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
@@ -121,8 +121,8 @@ pub enum AnyDecoder {
 }
 
 impl AnyDecoder {
-    /// [`Decoder::decode_at`] of the model that there is. Not a method of [`Decode`]: there it
-    /// would take flash of every controller, which has codes.
+    /// [`Decoder::decode_at`] of the model in use. The trait [`Decode`] leaves it out: it would take
+    /// flash of every controller, which has codes.
     pub fn decode_at(
         &self,
         hall: [i32; 3],

@@ -83,8 +83,8 @@ impl Words {
     }
 }
 
-/// Over random words as parameters nothing is NaN, what is invalid is zero, and every bit is
-/// what plain comparisons give.
+/// With random words as parameters no pose is NaN, invalid fields are zero, and every status bit
+/// equals the plain comparison.
 #[test]
 fn any_words_as_parameters_give_defined_poses() {
     let mut w = Words(0x2545_f491);

@@ -56,7 +56,7 @@ impl RawFrame {
 /// The codes that a sensor can plausibly give: both ends belong to it.
 ///
 /// The narrowest sensible window leaves out the converter's two end codes, since a
-/// saturated converter gives those for every larger signal.
+/// saturated converter gives an end code for every larger signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]

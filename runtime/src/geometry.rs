@@ -5,9 +5,9 @@
 //!
 //! theta is the angle of u, counterclockwise, from +Y for A and B and from +X for C. In the
 //! paper's stage these are the designed directions and theta is the misalignment. A stage
-//! whose probes are mounted in other directions has other designed thetas: 180 degrees for a
-//! probe mounted the other way round. Nothing else depends on the direction, so a blob
-//! stores theta as it is here, and needs no entry for the designed directions.
+//! with probes in other directions has other designed thetas: 180 degrees for a probe
+//! mounted the other way round. Only theta depends on the direction, so a blob stores this
+//! theta, and needs no entry for the designed directions.
 //!
 //! Two coordinates of a probe enter PM only through its lever arm, so no data can separate them.
 //! A calibration holds lever arms and thetas; places are kept only as designed values.

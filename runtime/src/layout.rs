@@ -192,9 +192,9 @@ fn visit_field_probe(
     visit("the lateral rows", lateral);
 }
 
-/// Puts back the matrices that are not in the blob of a field model: PM^-1 and the capacitive
-/// plane matrix are the constants over the scales of the codes, PM is the inverse of PM^-1, and the
-/// geometry that of PM. Of unsound constants they are unsound as well, and refused as such.
+/// Computes the matrices that the blob of a field model leaves out. PM^-1 and the capacitive plane
+/// matrix are the constants over the scales of the codes. PM is the inverse of PM^-1 and holds the
+/// geometry. Unsound constants give unsound matrices, which the checks refuse.
 pub(crate) fn restore(set: &mut ParameterSet) {
     if let Probes::Field(_) = set.probes {
         let c = &set.constants;
@@ -254,8 +254,8 @@ impl Out<'_> {
     }
 }
 
-/// Reads a payload, which must end where the set does; `None` if it is none. In a function of its
-/// own, what it needs leaves the stack before the checks.
+/// Reads a payload, which must end where the set does; `None` if it is none. As a function of
+/// its own it frees its stack before the checks.
 #[inline(never)]
 pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSet> {
     let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
@@ -309,7 +309,7 @@ pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSe
     (complete && rest.is_empty()).then_some(set)
 }
 
-/// Refuses a number that is not finite, by the name of its group. The set stays as it is.
+/// Refuses a number that is not finite, by the name of its group. The set is unchanged.
 pub(crate) fn check_finite(set: &mut ParameterSet) -> Result<(), ParameterError> {
     let mut found = Ok(());
     for_each_row(set, &mut |group, row| {

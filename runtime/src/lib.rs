@@ -20,12 +20,12 @@
 //! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
 //! | [`frame`] | codes as the converters gave them, and what makes a code bad |
 //! | [`status`] | the documented bit mask that goes with every pose |
-//! | [`temperature`] | the factor by which sensitivities follow temperature |
+//! | [`temperature`] | how sensitivities follow temperature |
 //! | [`calibration`] | what a fit yields, in SI units, and how it becomes decoder constants |
 //! | [`decoder`] | one frame to one reading: the flat tick path |
 //! | [`tracker`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
 //! | [`zero_offset`] | the zero deviation measured at rest |
-//! | [`prediction`] | the pose at a later time than that of the sample |
+//! | [`prediction`] | the pose at a time after its sample |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
 //! | [`real`] | the operations that a number must have to run a model |

@@ -1,10 +1,10 @@
 //! What a measurement model is, the models of the paper and the field model.
 //!
-//! A [`Model`] is a type: what it knows of a probe, and the planar pose of one tick. The
-//! paper's models are one of them, [`LinearModel`]; what a magnet's field does beside the
-//! centre line is another, [`FieldModel`]. A [`Decoder`](crate::Decoder) runs either without
-//! a choice in the tick. Two enums name every model that a parameter set can hold:
-//! [`ModelKind`] says what was fitted, [`Probes`] holds what was found.
+//! A [`Model`] is a type: the coefficients of a probe, and the planar pose of one tick.
+//! [`LinearModel`] is the paper's models; [`FieldModel`] adds the field beside the magnet's
+//! centre line. A [`Decoder`](crate::Decoder) runs either without a choice in the tick. Two
+//! enums name every model of a parameter set: [`ModelKind`] says which model was fitted,
+//! [`Probes`] holds its coefficients.
 //!
 //! Sums are written out in a fixed order: they are the arithmetic of the target, to the bit.
 
@@ -78,7 +78,7 @@ use serde::{Deserialize, Serialize};
 ///     let decoder = Decoder::<Bent>::new(constants, [BentProbe { linear, per_z2_m2 }; 3]);
 ///     decoder.decode(&frame, &PlanarPose::ZERO)
 /// };
-/// // phi = 1 + 0.1 + 9e7 * 1e-8 = 2: half of what the codes say.
+/// // phi = 1 + 0.1 + 9e7 * 1e-8 = 2: half the displacement of the codes.
 /// let pose = read(9e7).planar().expect("sound").to_array();
 /// for (have, want) in pose.iter().zip([5e-6, -2.5e-6, 1.25e-6]) {
 ///     assert!((have - want).abs() < 1e-12);
@@ -124,7 +124,7 @@ pub enum ModelKind {
     M30,
     /// Model (31): as (30), with a sensitivity that follows the vertical pose.
     M31,
-    /// The field model: as (31), with what a magnet's field does beside its centre line.
+    /// The field model: as (31), with the field beside the magnet's centre line.
     Field,
 }
 

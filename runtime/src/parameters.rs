@@ -11,9 +11,9 @@ pub type Text = String<32>;
 
 /// Everything that the decoder needs, and what `inspect` and a later refit need.
 ///
-/// The order of the fields is that of the blob (see [`crate::blob`]), where the code windows
-/// come last and the counts before the numbers. With the field model, PM, PM^-1 and the
-/// capacitive plane matrix are not in the blob: they are those that the constants give.
+/// The fields have the order of the blob (see [`crate::blob`]), where the code windows
+/// come last and the counts before the numbers. The blob of a field model leaves out PM, PM^-1
+/// and the capacitive plane matrix: they follow from the constants.
 ///
 /// ```
 /// use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};

@@ -1,5 +1,5 @@
-//! The planar pose at a later time than that of the sample, for a controller that uses it some
-//! tenths of a millisecond after the converter took it.
+//! The planar pose at a time after its sample, for a controller that uses it some tenths of a
+//! millisecond later.
 //!
 //! [`Predictor`] carries the last valid pose on by its age times the velocity, which is the
 //! slope of the least-squares line through the last [`POSES`] valid poses:
@@ -10,9 +10,9 @@
 //!
 //! An age costs speed times age: at 4.8 mm/s 1.4 um for 0.3 ms. The slope over eight poses adds
 //! 1.3 % to white noise at an age of 0.3 ms and 4 % at 1 ms (poses 2 ms apart); the difference
-//! of the last two would add 16 % and 58 %. In exchange the velocity is that of 7 ms ago: at the
-//! 57 mm/s^2 that go with 4.8 mm/s it is 0.4 mm/s late, 0.12 um for 0.3 ms. What is left of the
-//! error in service stands in the README.
+//! of the last two would add 16 % and 58 %. In exchange the velocity is 7 ms old: at 57 mm/s^2,
+//! which go with 4.8 mm/s, it is 0.4 mm/s late, 0.12 um for 0.3 ms. The README has the remaining
+//! error in service.
 
 use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;

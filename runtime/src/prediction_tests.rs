@@ -182,7 +182,7 @@ fn a_zero_deviation_that_changes_is_no_movement() {
         }
         let (predicted, measured) = tick(&mut tracker, k);
         assert_eq!(predicted.is_some(), (7..12).contains(&k) || k >= 20, "{k}");
-        // The stage stands: what is predicted is what is measured.
+        // The stage stands: predicted and measured pose are equal.
         assert!(predicted.is_none() || predicted == measured);
     }
 }

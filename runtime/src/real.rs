@@ -1,9 +1,9 @@
 //! The operations that a number must have to run the model.
 //!
 //! Only the core operators, which IEEE 754 rounds the same everywhere, and sine and
-//! cosine from `libm`, whose code is the same on every machine. No fused multiply-add
-//! and no function whose backend a feature could switch: so the target's words equal the
-//! host's.
+//! cosine from `libm`, which has the same code on every machine. There is no fused
+//! multiply-add and no function with a backend that a feature could switch: so the target's
+//! words equal the host's.
 
 use nalgebra::{Field, Scalar};
 

@@ -30,7 +30,7 @@ impl ParameterSet {
         self.check_terms()
     }
 
-    /// The checks of [`ParameterSet::check`] for a set whose numbers are finite.
+    /// The checks of [`ParameterSet::check`] for a set of finite numbers.
     pub(crate) fn check_terms(&self) -> Result<(), ParameterError> {
         self.check_signs()?;
         self.check_inverse()?;
@@ -182,7 +182,7 @@ fn product(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
     a * b
 }
 
-/// Refuses what differs by more than rounding from what it was made of: m, rad or 1.
+/// Refuses a difference beyond rounding from the values that a term was made of: m, rad or 1.
 #[inline(never)]
 fn check_near(term: &'static str, made: &[f32; 3], from: &[f32; 3]) -> Result<(), ParameterError> {
     for (made, from) in made.iter().zip(from) {
@@ -223,7 +223,7 @@ fn swing(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
     reach(&[s.per_z_m, s.per_rx_rad, s.per_ry_rad], limits)
 }
 
-/// The largest product of a row and a column whose magnitudes are at most `limits`.
+/// The largest product of a row and a column of magnitudes up to `limits`.
 #[inline(never)]
 fn reach([a, b, c]: &[f32; 3], limits: &[f32; 3]) -> f32 {
     (a.abs() * limits[0] + b.abs() * limits[1]) + c.abs() * limits[2]

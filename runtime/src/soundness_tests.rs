@@ -1,4 +1,4 @@
-//! What is refused of a parameter set.
+//! Parameter sets that are refused.
 
 use super::*;
 use crate::frame::CodeWindow;
@@ -9,14 +9,14 @@ use ParameterError::{Inconsistent, NotFinite, NotPositive, PoleInRange, UnsoundW
 type Change = fn(&mut ParameterSet);
 type ChangeTo = fn(&mut ParameterSet, f32);
 
-/// What a sound set is refused for after a change.
+/// Why a sound set is refused after a change.
 fn refused(mut set: ParameterSet, change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
     assert_eq!(set.check(), Ok(()));
     change(&mut set);
     set.check().expect_err("an unusable set")
 }
 
-/// Of Model (31), whose blob holds every number: it is refused, too.
+/// The same for a set of Model (31). Its blob holds every number, so it is refused, too.
 fn refused_31(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
     let mut buffer = [0; crate::blob::MAX_BYTES];
     let mut changed = sample::parameters();

@@ -13,7 +13,7 @@
 //! | 14 | 16384 | Z, Rx, Ry invalid in this period | they are 0, or held |
 //! | 15 | 32768 | X, Y, Rz are the last valid ones, repeated | |
 //! | 16 | 65536 | Z, Rx, Ry are the last valid ones, repeated | |
-//! | 17 | 131072 | one or more servo periods had no frame before this one | |
+//! | 17 | 131072 | one or more servo periods before this frame had no frame | |
 //! | 18 | 262144 | the frame repeats an earlier sequence number: nothing new | all six invalid |
 //! | 19 | 524288 | a zero deviation is subtracted from X, Y, Rz | none: no fault |
 //! | 20 | 1048576 | a temperature is missing or implausible | none: decoded as if at T0 |
@@ -57,7 +57,7 @@ impl Status {
     pub const PLANAR_HELD: Self = Self(1 << 15);
     /// Z, Rx, Ry are repeated.
     pub const VERTICAL_HELD: Self = Self(1 << 16);
-    /// Frames are missing before this one.
+    /// Frames are missing before this frame.
     pub const FRAMES_MISSED: Self = Self(1 << 17);
     /// The frame is not new.
     pub const FRAME_REPEATED: Self = Self(1 << 18);
@@ -100,7 +100,7 @@ impl Status {
         ),
     ];
 
-    /// The mask as a number, as it is sent and logged.
+    /// The mask as a number, for bus and log.
     #[inline(always)]
     pub const fn bits(self) -> u32 {
         self.0

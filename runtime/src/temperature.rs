@@ -1,7 +1,7 @@
 //! How the sensitivity follows temperature: one factor for each probe, in every model.
 //!
-//! With M the temperature of the magnets' mount, H that of the stage body at the Hall elements,
-//! and dM, dH their distances from T0, at which the stage was calibrated:
+//! M is the temperature of the magnets' mount and H the temperature of the stage body at the Hall
+//! elements. dM and dH are their distances from T0, the temperature of the calibration:
 //!
 //! G_i = 1 + k_i dM + h_i dH, and phi_i becomes G_i phi_i.
 //!
@@ -31,7 +31,7 @@ impl<T: Real> Temperature<T> {
         reach_mk: [0; 2],
     };
 
-    /// Default of `reach_mk`: three times what a stage warms by at work. Farther off a linear
+    /// Default of `reach_mk`: three times the warming of a stage in service. Farther off a linear
     /// gain no longer holds, and a sensor is more likely broken.
     pub const REACH_MK: u32 = 30_000;
 
@@ -92,8 +92,8 @@ impl<T: Real> Temperature<T> {
     }
 }
 
-/// All ones if a change lies beyond -reach..reach, mK, else 0: the borrow of one subtraction. A mask
-/// from a comparison would be made a choice between numbers, for which the tick has no registers left.
+/// All ones if a change lies beyond -reach..reach, mK, else 0: the borrow of one subtraction. The compiler
+/// turns a mask from a comparison into a choice between numbers, and the tick has no registers left for it.
 /// For a reach of 0 the limit wraps to the largest number, which nothing is beyond.
 #[inline(always)]
 const fn beyond(change_mk: i32, reach_mk: u32) -> i32 {

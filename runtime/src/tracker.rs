@@ -33,11 +33,11 @@ pub enum OnInvalid {
 pub struct Health {
     /// Ticks, with and without a frame.
     pub ticks: u32,
-    /// Ticks whose planar pose was invalid.
+    /// Ticks with an invalid planar pose.
     pub planar_invalid: u32,
-    /// Ticks whose vertical pose was invalid.
+    /// Ticks with an invalid vertical pose.
     pub vertical_invalid: u32,
-    /// Ticks in which a value was held.
+    /// Ticks with a held value.
     pub held: u32,
     /// Servo periods that had no frame.
     pub frames_missed: u32,
@@ -120,16 +120,16 @@ impl<D: Decode> PoseTracker<D> {
     /// One servo period: decodes the frame, subtracts the zero deviation, holds or zeroes
     /// what is invalid, counts, and feeds a re-zero in progress.
     ///
-    /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
-    /// than half of it) is not new and is not decoded. A source that starts to count
+    /// A frame is new if its sequence number is ahead of the last frame's (modulo 2^32, by less
+    /// than half of it). Other frames are not decoded. A source that starts to count
     /// again from a lower number is refused until it has caught up: call [`PoseTracker::forget`] when
     /// it restarts.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
         self.step(frame.sequence, |decoder, zero| decoder.decode(frame, zero))
     }
 
-    /// As [`PoseTracker::tick`], with what `decode` makes of the period, less the zero deviation that
-    /// it is given: for a vertical pose that is known by other means (a log in SI columns), see
+    /// As [`PoseTracker::tick`] with a decoder of the caller, which subtracts the zero deviation that it
+    /// is given: for a vertical pose that is known by other means (a log in SI columns), see
     /// [`Decoder::decode_at`](crate::Decoder::decode_at).
     #[inline(always)]
     pub fn tick_with(
@@ -157,8 +157,8 @@ impl<D: Decode> PoseTracker<D> {
         reading
     }
 
-    /// Takes note of a frame's sequence number: what it says about missed frames, or `None`
-    /// when the frame is not new.
+    /// Takes note of a frame's sequence number. Returns the status of missed frames, or `None`
+    /// if the frame is not new.
     #[inline(always)]
     fn follow(&mut self, sequence: u32) -> Option<Status> {
         let ahead = match self.last_sequence {
@@ -179,7 +179,7 @@ impl<D: Decode> PoseTracker<D> {
         })
     }
 
-    /// One servo period in which no frame came: nothing is measured, values are held or zero.
+    /// One servo period without a frame: there is no measurement, values are held or zero.
     ///
     /// The period takes a sequence number, as in a source that numbers periods: a frame of that
     /// number that comes after all is late, and is judged repeated. A source that numbers only
@@ -194,8 +194,8 @@ impl<D: Decode> PoseTracker<D> {
         self.conclude(NOTHING, Status::FRAMES_MISSED)
     }
 
-    /// Starts to average at rest; [`PoseTracker::zero_offset_state`] tells how it goes. The zero
-    /// deviation in use stays until the run is done, and stays for good if it is refused.
+    /// Starts to average at rest; [`PoseTracker::zero_offset_state`] reports the progress. The zero
+    /// deviation in use stays until the run is done, and also if the run is refused.
     pub fn start_zero_offset(&mut self, settings: ZeroOffsetSettings) {
         match ZeroOffsetRun::start(settings) {
             Ok(run) => {

@@ -3,7 +3,7 @@
 //! The stage stands at its zero. The poses of N ticks are averaged; the mean is the pose
 //! that the decoder shows where it should show none, and is subtracted from then on. The
 //! run refuses when the stage moves: when the poses spread further than noise does, or the
-//! mean of the second half differs from that of the first. It also refuses when the stage
+//! means of the two halves differ. It also refuses when the stage
 //! stands elsewhere: when the mean is larger than a zero deviation can be, when the stage is
 //! lifted or tilted, or when a pose lies outside the calibrated range.
 
@@ -55,7 +55,7 @@ impl Default for ZeroOffsetSettings {
     }
 }
 
-/// Why a re-zero was refused. The zero deviation stays as it was.
+/// Why a re-zero was refused. The zero deviation is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroOffsetRefusal {
@@ -101,7 +101,7 @@ pub enum ZeroOffsetRefusal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroOffsetState {
-    /// None was asked for.
+    /// No re-zero was asked for.
     Idle,
     /// It runs.
     Running {
@@ -232,8 +232,8 @@ fn pairwise(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) -> [f32; 3] {
     [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
 }
 
-/// The first of three values whose magnitude is above its limit, and which it is. Not inlined:
-/// it is called four times, off the tick path.
+/// The first of three values above its limit in magnitude, with its index. It is called four times
+/// off the tick, so it is not inlined.
 #[inline(never)]
 fn beyond(values: [f32; 3], limits: [f32; 3]) -> Option<(u8, f32)> {
     (0u8..)

@@ -1,5 +1,5 @@
-//! Hours of ticks with faults: every status is the one that the injected fault explains, held poses
-//! are the last valid ones to the bit, and the counters add up.
+//! Hours of ticks with faults: the injected fault explains every status, held poses equal the last
+//! valid pose to the bit, and the counters add up.
 
 use runtime::frame::MISSING_CODE;
 use runtime::tracker::Health;
@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 
 /// Ticks of an hour at 2 ms.
 const HOUR: u32 = 1_800_000;
-/// Ticks for which a pose is held.
+/// Longest hold, ticks.
 const HOLD: u16 = 5;
 
 const INVALID: Status = Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID);
 
-/// What the numbers decide, not the codes: of X, Y, Rz, and of all six.
+/// Bits that depend on the numbers and not on the codes: of X, Y, Rz, and of all six.
 const PLANAR_DECODED: Status = Status::SENSITIVITY
     .with(Status::PLANAR_NOT_FINITE)
     .with(Status::PLANAR_EXTRAPOLATED);
@@ -35,7 +35,7 @@ enum Event {
     /// Codes of a pose outside the calibrated range.
     FarPlanar,
     FarVertical,
-    /// So many frames were lost before this one, and no one noticed.
+    /// This number of frames was lost before, and no one noticed.
     Gap(u32),
     /// The tick passes without a frame.
     NoFrame,
@@ -99,8 +99,8 @@ struct Account {
 }
 
 impl Account {
-    /// Checks a reading against what its event explains; `decoded` is the decoder's own word on the
-    /// frame, if there was a new one.
+    /// Checks a reading against what its event explains; `decoded` is the decoder's own reading of the
+    /// frame, if there was a new frame.
     fn check(&mut self, event: Event, reading: &Reading, decoded: Option<Reading>) {
         let mut status = match event {
             Event::Sound | Event::Zero(_) => Status::GOOD,
@@ -187,7 +187,7 @@ fn frame(n: u32, sequence: u32) -> RawFrame {
     )
 }
 
-/// Runs a stage for so many ticks, from a sequence number that wraps on the way.
+/// Runs a stage for `ticks`, from a sequence number that wraps on the way.
 fn soak(blob: &[u8], ticks: u32, seed: u64) {
     let set = ParameterSet::from_bytes(blob).expect("a golden blob");
     let decoder = set.decoder();

@@ -1,6 +1,6 @@
 //! The runtime for a controller written in C: load a blob, tick, read pose and status.
 //!
-//! The header `hall_runtime.h` is made from this file by cbindgen. Nothing allocates: the
+//! The header `hall_runtime.h` is made from this file by cbindgen. There is no allocation: the
 //! caller keeps a [`HallDecoder`] and a [`HallServo`], usually in static memory. No function
 //! can panic, only [`hall_servo_start`] keeps a pointer. A null pointer is refused, and so is a
 //! decoder that was never loaded or a servo that was never started: keep both in static memory,
@@ -37,7 +37,7 @@ pub extern "C" fn hall_arithmetic_is_sound() -> bool {
 
 /// Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 /// and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
-/// NULL to take that of any. Unless the result is HALL_RESULT_OK, the decoder stays as it was.
+/// NULL to take any stage. Unless the result is HALL_RESULT_OK, the decoder is unchanged.
 ///
 /// # Safety
 /// `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
@@ -72,11 +72,11 @@ pub unsafe extern "C" fn hall_load(
 
 /// Starts a servo: no zero deviation, nothing to hold, all counters zero. What is invalid is
 /// held for `hold_ticks` ticks in a row, and zero after that. Unless the result is
-/// HALL_RESULT_OK, the servo stays as it was.
+/// HALL_RESULT_OK, the servo is unchanged.
 ///
 /// # Safety
 /// `decoder` is NULL, or memory that was zero before hall_load filled it or failed to; once it is
-/// filled, it stays as it is, and where it is, for as long as the servo is used.
+/// filled, it is neither changed nor moved while the servo is used.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hall_servo_start(
@@ -111,7 +111,7 @@ pub extern "C" fn hall_tick(
     })
 }
 
-/// One servo period in which no frame came: values are held or zero. Unless the result is
+/// One servo period without a frame: values are held or zero. Unless the result is
 /// HALL_RESULT_OK, all six fields of the reading are 0 and marked invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_tick_without_frame(
@@ -128,7 +128,7 @@ pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) -> HallResult {
 }
 
 /// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
-/// movement and of the zero deviation; hall_rezero_state tells how it goes.
+/// movement and of the zero deviation; hall_rezero_state reports the progress.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) -> HallResult {
     result(started(servo).map(|servo| {

@@ -37,7 +37,7 @@ pub enum HallResult {
     BadPayload = 8,
     /// A parameter is NaN or infinite, a matrix singular, or the like.
     UnusableParameters = 9,
-    /// The blob belongs to another stage than the one expected.
+    /// The blob belongs to another stage than expected.
     OtherStage = 10,
     /// The decoder was never loaded.
     NotLoaded = 11,
@@ -49,7 +49,7 @@ pub enum HallResult {
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HallRezero {
-    /// None was asked for.
+    /// No re-zero was asked for.
     Idle = 0,
     /// It runs.
     Running = 1,
@@ -136,13 +136,13 @@ pub const HALL_STATUS_VERTICAL_INVALID: u32 = 1 << 14;
 pub const HALL_STATUS_PLANAR_HELD: u32 = 1 << 15;
 /// Z, Rx, Ry are the last valid ones, repeated.
 pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 16;
-/// One or more servo periods had no frame before this one.
+/// One or more servo periods before this frame had no frame.
 pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
 /// The frame repeats an earlier sequence number.
 pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
 /// A zero deviation is subtracted from X, Y, Rz. No fault.
 pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
-/// A temperature is missing or implausible: decoded as if at that of the calibration.
+/// A temperature is missing or implausible: decoded as if at T0 of the calibration.
 pub const HALL_STATUS_TEMPERATURE_MISSING: u32 = 1 << 20;
 
 impl HallPlanarPose {
@@ -154,7 +154,7 @@ impl HallPlanarPose {
 }
 
 impl HallReading {
-    /// Nothing was measured.
+    /// There is no new measurement.
     pub(crate) const INVALID: Self = Self {
         x_m: 0.0,
         y_m: 0.0,

@@ -1,5 +1,4 @@
-//! The field model: what a probe reads near a magnet that it does not pass exactly in the
-//! middle.
+//! The field model: the signal of a probe that passes beside the middle of its magnet.
 //!
 //! With u the displacement along a probe's sensing axis, w that across it, V = (Z, Rx, Ry),
 //! phi = eta + zr, zr = a Z + b Rx + c Ry and z = zr / eta:
@@ -15,14 +14,14 @@
 //! v = p - (p_u v + p_w W PM^-1 v)
 //!
 //! is found in two passes from v = p, W being the lateral rows (w = W PM^-1 u); then
-//! q = PM^-1 u - zero. It has three divisions and no branch, and leaves a third of what two
-//! passes of u = r - p(u, w, z) leave. Small terms are summed first: what is added to a
-//! displacement of half a millimetre is rounded to its last digit each time.
+//! q = PM^-1 u - zero. It has three divisions and no branch. Its error is a third of the error of
+//! two passes of u = r - p(u, w, z). Small terms are summed first: each addition
+//! to a displacement of half a millimetre rounds to its last digit.
 //!
 //! Powers of 1/eta and the unit of the signal (codes on the target) are folded into the
-//! constants, so that the tick uses zr, and codes, as they are. The terms of p that depend on
-//! the height alone have no slopes and are taken off r; the others are a polynomial in u and w
-//! alone at one height.
+//! constants, so that the tick uses zr and codes directly. The terms of p that depend on the
+//! height alone have no slopes and are subtracted from r. At one height the other terms are a
+//! polynomial in u and w.
 
 use super::{Model, Sensitivity, dot, dot_less, with_gain};
 use crate::pose::{PlanarPose, VerticalPose};
@@ -33,8 +32,8 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldModel {}
 
-/// The constants of one probe in the field model. The unit of the signal is that of the codes
-/// on the target: displacement per code at the designed sensitivity.
+/// The constants of one probe in the field model. On the target the unit of the signal is
+/// the code: displacement per code at the designed sensitivity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct FieldProbe<T> {
@@ -168,7 +167,7 @@ fn change_with<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T
         + probe.per_ry_rad * vertical.ry_rad
 }
 
-/// p at r - v, by its slopes at r: what one pass makes of v.
+/// p at r - v, by its slopes at r: one pass.
 #[inline(always)]
 fn moved<T: Real>(probes: &[FieldProbe<T>; 3], p: &[Tangent<T>; 3], v: [T; 3]) -> [T; 3] {
     [
@@ -294,7 +293,7 @@ mod tests {
         (eta + zr) * (u + carried + shape)
     }
 
-    /// The signals of the sample at a pose, decoded: phi, the pose, and what Model (31) makes of it.
+    /// The signals of the sample at a pose, decoded: phi, the pose, and the pose by Model (31).
     fn decoded(q: [f64; 3], v: [f64; 3]) -> ([f64; 3], [f64; 3], [f64; 3]) {
         let vertical = VerticalPose::from_array([250e-6 * v[0], 5e-4 * v[1], 5e-4 * v[2]]);
         let calibration = sample::field_calibration();
@@ -315,7 +314,7 @@ mod tests {
         (phi, back.to_array(), other.to_array())
     }
 
-    /// Model (31) is far off at the ends of the range, if not at each pose: the terms do something.
+    /// Model (31) is far off at the ends of the range: the terms have an effect.
     #[test]
     fn the_terms_of_the_sample_move_its_pose() {
         for sign in [-1.0, 1.0] {
@@ -326,7 +325,7 @@ mod tests {
     }
 
     proptest! {
-        /// Within what one step leaves, where p is a third of its prior: 10 nm and 15 nrad.
+        /// Within the error of one step, where p is a third of its prior: 10 nm and 15 nrad.
         #[test]
         fn the_decoder_undoes_the_forward_model(
             q in prop::array::uniform3(-5e-4..5e-4f64),
@@ -352,12 +351,12 @@ mod tests {
             let ([u, w, zr], h) = (at, 1e-4);
             let p = |u, w| shape.at(u, w, zr).value;
             let Tangent { per_u, per_w, .. } = shape.at(u, w, zr);
-            // Of a cubic, the central difference errs by h^2 times its third coefficient.
+            // The central difference of a cubic errs by h^2 times its third coefficient.
             prop_assert!((per_u - (p(u + h, w) - p(u - h, w)) / (2.0 * h)).abs() < 1e-7);
             prop_assert!((per_w - (p(u, w + h) - p(u, w - h)) / (2.0 * h)).abs() < 1e-7);
         }
 
-        /// Terms of zero add nothing: the poses are those of Model (31) at the same phi.
+        /// Terms of zero add nothing: the poses equal Model (31) at the same phi.
         #[test]
         fn without_its_terms_the_field_model_is_model_31(
             s in prop::array::uniform3(-8000.0..8000.0f32),
