@@ -23,8 +23,7 @@ fn main() {
     // The C code takes its floats in FPU registers.
     if std::env::var_os("CARGO_FEATURE_C_REFERENCE").is_some() {
         println!("cargo::rustc-cfg=c_reference");
-        c_reference("c", "fast");
-        c_reference("c_uncontracted", "off");
+        c_reference();
     }
 }
 
@@ -37,8 +36,8 @@ fn memory_map(images: &[&str], folder: &Path) {
     println!("cargo::rerun-if-changed={}", map.display());
 }
 
-/// Compiles the C code with or without contraction of multiply and add.
-fn c_reference(name: &str, contract: &str) {
+/// Compiles the C code.
+fn c_reference() {
     println!("cargo::rerun-if-changed=c_reference.c");
     cc::Build::new()
         .file("c_reference.c")
@@ -46,7 +45,5 @@ fn c_reference(name: &str, contract: &str) {
         .opt_level(3)
         .flag("-mcpu=cortex-m4")
         .flag("-fno-math-errno")
-        .flag(format!("-ffp-contract={contract}"))
-        .define("NAME(x)", format!("counted_{name}_##x").as_str())
-        .compile(&format!("counted_{name}"));
+        .compile("c_reference");
 }

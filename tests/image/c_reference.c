@@ -1,6 +1,5 @@
 /* The same kernel and the same tick in C, as a programmer would write them, to be counted
- * beside the Rust ones. The structs mirror those of the runtime. NAME(x) gives the two
- * builds, with and without contraction to fused multiply-add, their names. */
+ * beside the Rust ones. The structs mirror those of the runtime. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -42,7 +41,7 @@ static inline void pose_of(const float (*rows)[3], const float *signal, const fl
     pose->rz = dot(rows[2], ratio) - zero->rz;
 }
 
-void NAME(kernel)(const kernel *c, const float *signal, const vertical *v,
+void counted_c_kernel(const kernel *c, const float *signal, const vertical *v,
                   const planar *zero, planar *pose)
 {
     const float phi[3] = { phi_of(&c->probe[0], v), phi_of(&c->probe[1], v), phi_of(&c->probe[2], v) };
@@ -51,7 +50,7 @@ void NAME(kernel)(const kernel *c, const float *signal, const vertical *v,
 
 static inline bool outside(const window *w, int32_t code) { return code < w->low || code > w->high; }
 
-void NAME(tick)(const decoder *c, const frame *f, const planar *zero, reading *out)
+void counted_c_tick(const decoder *c, const frame *f, const planar *zero, reading *out)
 {
     uint32_t status = 0;
     float gap[3], hall[3], phi[3];

@@ -48,7 +48,7 @@ pub struct Comparison {
     pub ticks: usize,
     /// Words that are NaN on either side.
     pub nans: usize,
-    /// Ticks in which all is good.
+    /// Good ticks.
     pub good: usize,
     /// Words that differ.
     pub differing: usize,

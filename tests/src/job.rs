@@ -10,8 +10,8 @@
 //! | 9 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number, temperatures of mount and body |
 //!
 //! Bare words go straight into a decoder, unchecked: they may be anything. A blob is loaded
-//! as from flash and run by a servo; in a section of [`PREDICTED`] X, Y, Rz are those of a
-//! [`Predictor`]. This file is compiled into the host's tool and into the
+//! as from flash and run by a servo; in a section of [`PREDICTED`] a [`Predictor`] gives X, Y,
+//! Rz. This file is compiled into the host's tool and into the
 //! image, so it uses `core` only.
 
 #[path = "job_run.rs"]
@@ -55,7 +55,7 @@ pub struct Head {
     pub source: u32,
     /// Frames that follow the parameters.
     pub frames: u32,
-    /// Ticks for which a servo holds what is invalid; 0: it reads zero.
+    /// Longest hold of an invalid value, ticks; 0: it reads zero.
     pub hold: u32,
     /// Bytes of the blob before its padding.
     pub blob_bytes: u32,
@@ -100,7 +100,7 @@ impl Head {
     }
 }
 
-/// A tracker whose X, Y, Rz are predicted, from frames whose times its sequence numbers give.
+/// A tracker with predicted X, Y, Rz. The time of a frame follows from its sequence number.
 pub struct PredictingTracker {
     tracker: PoseTracker,
     predictor: Predictor,
@@ -130,7 +130,7 @@ impl PredictingTracker {
     }
 }
 
-/// A model whose decoder goes through a job file as bare words.
+/// A model with a decoder that goes through a job file as bare words.
 pub trait Bare: Model {
     /// Its source: [`WORDS`] or [`FIELD_WORDS`].
     const SOURCE: u32;

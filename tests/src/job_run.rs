@@ -11,19 +11,19 @@ use runtime::{
 /// Frames of one transfer.
 const BATCH: usize = 512;
 
-/// The bytes of a job, and where those of its answer go.
+/// Reads the bytes of a job and writes the bytes of its answer.
 pub trait Transfer {
     /// Why bytes do not come or go.
     type Fault;
     /// Fills `bytes` with the next ones of the job; `false` if it has ended before.
     ///
     /// # Errors
-    /// What the transfer says.
+    /// The fault of the transfer.
     fn read(&mut self, bytes: &mut [u8]) -> Result<bool, Self::Fault>;
     /// Appends bytes to the answer.
     ///
     /// # Errors
-    /// What the transfer says.
+    /// The fault of the transfer.
     fn write(&mut self, bytes: &[u8]) -> Result<(), Self::Fault>;
 }
 

@@ -6,7 +6,7 @@
 //! | [`job`] | frames in, words out: the files that host and target exchange |
 //! | [`motion`] | frames and parameters for a job: a log, random codes, random words |
 //! | [`compare`] | the host's words of a job beside the target's |
-//! | [`listing`] | the instructions of an image: stack, cycles, calls |
+//! | [`listing`] | the instructions of an image: stack, jumps, calls |
 //! | [`fault`] | frames dropped, repeated, delayed and damaged on the way, by a seed |
 //! | [`random`] | random numbers that depend on a seed alone |
 //! | [`node`] | a node that takes new parameters over the bus |

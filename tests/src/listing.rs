@@ -86,7 +86,7 @@ impl Instruction {
         list.split(',').map(words).sum()
     }
 
-    /// Bytes by which it lowers the stack pointer.
+    /// Bytes that it takes from the stack.
     pub fn pushed_bytes(&self) -> u64 {
         let name = self.mnemonic.split('.').next().unwrap_or("");
         let immediate = || {
@@ -103,39 +103,6 @@ impl Instruction {
                 immediate().map_or(0, i64::unsigned_abs)
             }
             _ => 0,
-        }
-    }
-
-    /// Cycles on a Cortex-M4 with zero-wait memory, by the instruction tables of its
-    /// technical reference manual (sections 3.3.1 and 7.2.3): each instruction by itself,
-    /// so loads that the pipeline overlaps count in full and a taken jump counts three
-    /// cycles of refill.
-    pub fn cycles(&self) -> u64 {
-        const REFILL: u64 = 3;
-        let name = self.mnemonic.split('.').next().unwrap_or("");
-        let words = self.listed_words();
-        let refill = if self.operands.contains("pc}") {
-            REFILL
-        } else {
-            0
-        };
-        match name {
-            "vdiv" | "vsqrt" => 14,
-            "push" | "pop" | "vpush" | "vpop" => 1 + words + refill,
-            _ if name.starts_with("ldm") || name.starts_with("stm") => 1 + words + refill,
-            _ if name.starts_with("vldm") || name.starts_with("vstm") => 1 + words,
-            _ if name.starts_with("ldrd") || name.starts_with("strd") => 3,
-            _ if name.starts_with("ldr") || name.starts_with("str") => 2,
-            _ if name.starts_with("vldr") || name.starts_with("vstr") => 2,
-            _ if ["vmla", "vmls", "vnml", "vfma", "vfms", "vfnm"]
-                .iter()
-                .any(|start| name.starts_with(start)) =>
-            {
-                3
-            }
-            "bl" | "blx" | "bx" => 1 + REFILL,
-            _ if self.is_jump() => 1 + REFILL,
-            _ => 1,
         }
     }
 }

@@ -20,8 +20,6 @@ pub struct Counts {
     pub most: u64,
     /// Most divisions of a call.
     pub divisions: u64,
-    /// Most cycles of a call, estimated: see [`Instruction::cycles`].
-    pub cycles: u64,
     /// Instructions outside the function itself, over all calls: those of its callees.
     pub in_callees: u64,
 }
@@ -33,7 +31,6 @@ struct Call {
     return_to: [u32; 2],
     instructions: u64,
     divisions: u64,
-    cycles: u64,
     in_callees: u64,
 }
 
@@ -73,7 +70,6 @@ pub fn count(
                 return_to: [before + 4, before + 2],
                 instructions: 0,
                 divisions: 0,
-                cycles: 0,
                 in_callees: 0,
             });
         }
@@ -81,7 +77,6 @@ pub fn count(
             let instruction = listing.at(at);
             call.instructions += 1;
             call.divisions += u64::from(instruction.is_some_and(Instruction::is_division));
-            call.cycles += instruction.map_or(1, Instruction::cycles);
             call.in_callees += u64::from(!(call.entry..call.end).contains(&at));
         }
         before = at;
@@ -98,7 +93,6 @@ impl Counts {
         self.calls += 1;
         self.most = self.most.max(call.instructions);
         self.divisions = self.divisions.max(call.divisions);
-        self.cycles = self.cycles.max(call.cycles);
         self.in_callees += call.in_callees;
     }
 }

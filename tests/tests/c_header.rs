@@ -1,4 +1,4 @@
-//! The header of the C interface is what its source says.
+//! The header of the C interface agrees with its source.
 
 use runtime::Status;
 use std::path::Path;

@@ -11,10 +11,10 @@ pub const PERIOD_US: u32 = 2_000;
 /// From the sample to the change of the forces, us.
 pub const FORCES_US: u32 = 300;
 
-/// Of the shipped stage; a controller reads them from its flash by `ParameterSet::from_flash`.
+/// The parameters of the shipped stage; a controller reads them from its flash by `ParameterSet::from_flash`.
 ///
 /// # Errors
-/// Those of the blob.
+/// A blob that is refused.
 pub fn parameters() -> Result<ParameterSet, BlobError> {
     ParameterSet::from_bytes(include_bytes!("../../../runtime/examples/stage.bin"))
 }

@@ -1,4 +1,4 @@
-//! Compares the words of a target with those of the host. See `compare --help`.
+//! Compares the words of a target with the host's. See `compare --help`.
 
 use clap::{Args, Parser, Subcommand};
 use host_fit::input::log::{self, ReadOptions};
@@ -15,7 +15,7 @@ use tests::compare::{Comparison, compare, to_bytes};
 use tests::job::Bare;
 use tests::motion::{self, Section};
 
-/// Compares the words that a target gives with those of the host, bit for bit.
+/// Compares the words of a target with the host's, bit for bit.
 ///
 /// `make` writes the frames of a log, random codes and random parameters into a job file, for
 /// Model (31) and for the field model, with and without temperatures; an
@@ -43,7 +43,7 @@ enum Command {
 struct Make {
     /// The parameter blob of a fit by Model (31); the field model's is made of it.
     params: PathBuf,
-    /// The log; the one that ships with the program if not given.
+    /// The log; default: the log that ships with the program.
     #[arg(long)]
     log: Option<PathBuf>,
     /// The stage that the log belongs to.
@@ -58,7 +58,7 @@ struct Make {
     /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
     #[arg(long, default_value_t = 32_000)]
     parameters: usize,
-    /// Ticks for which what is invalid is held.
+    /// Longest hold of an invalid value, ticks.
     #[arg(long, default_value_t = 3)]
     hold: u16,
     /// Seed of everything random.

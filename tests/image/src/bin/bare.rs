@@ -1,5 +1,5 @@
 //! The least that a controller links: a blob loaded from flash, the tick of a servo with
-//! hold and re-zero. Its size is that of the runtime in flash.
+//! hold and re-zero. Its size is the size of the runtime in flash.
 #![no_std]
 #![no_main]
 

@@ -121,7 +121,7 @@ fn main() -> ! {
         let predicted = predictor.pose_at(2000 * period + FORCES_US);
         match predicted.or(reading.planar_or_held()) {
             Some(pose) => coils(&mut console, period, control(&pose)),
-            // Nothing measured for too long: let the stage down rather than guess.
+            // No measurement for too long: let the stage down rather than guess.
             None => coils(&mut console, period, [0.0; 3]),
         }
     }

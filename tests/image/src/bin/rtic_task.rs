@@ -1,5 +1,5 @@
 //! The runtime in an RTIC task, which owns tracker and predictor: a frame every 2 ms, X, Y, Rz at
-//! the time at which the forces change.
+//! the time of the new forces.
 //!
 //! SysTick stands for the timer that starts the converters, [`converters`] for them.
 #![no_std]

@@ -1,8 +1,7 @@
 //! Runs the pose kernel and the tick over many inputs, for an emulator's log of executed
 //! instructions to be counted, and prints the stack that each has touched.
 //!
-//! What is counted is one call of a function whose name starts with `counted_`, from its
-//! first instruction to its return. `counted_loop_1000` is a check of the counting: its
+//! One call of each function `counted_*` is counted, from its first instruction to its return. `counted_loop_1000` is a check of the counting: its
 //! length is known.
 #![no_std]
 #![no_main]
@@ -38,24 +37,6 @@ pub struct Kernel {
 }
 
 /// The pose kernel, Model (31): three sensitivities, three quotients, X, Y, Rz.
-#[inline(always)]
-fn kernel(
-    c: &Kernel,
-    signal: &Signal,
-    vertical: &VerticalPose<f32>,
-    zero: &PlanarPose<f32>,
-) -> PlanarPose<f32> {
-    let (_, pose) = LinearModel::planar_pose(
-        &c.probes,
-        &c.planar_per_code,
-        signal.0,
-        signal.1,
-        vertical,
-        zero,
-    );
-    pose
-}
-
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn counted_kernel(
@@ -65,18 +46,8 @@ extern "C" fn counted_kernel(
     zero: &PlanarPose<f32>,
     pose: &mut PlanarPose<f32>,
 ) {
-    *pose = kernel(c, signal, vertical, zero);
-}
-
-#[unsafe(no_mangle)]
-#[inline(never)]
-extern "C" fn counted_kernel_by_value(
-    c: &Kernel,
-    signal: Signal,
-    vertical: VerticalPose<f32>,
-    zero: PlanarPose<f32>,
-) -> PlanarPose<f32> {
-    kernel(c, &signal, &vertical, &zero)
+    let rows = &c.planar_per_code;
+    (_, *pose) = LinearModel::planar_pose(&c.probes, rows, signal.0, signal.1, vertical, zero);
 }
 
 #[unsafe(no_mangle)]
@@ -190,20 +161,7 @@ unsafe extern "C" {
         zero: &PlanarPose<f32>,
         pose: &mut PlanarPose<f32>,
     );
-    fn counted_c_uncontracted_kernel(
-        c: &Kernel,
-        signal: &Signal,
-        vertical: &VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-        pose: &mut PlanarPose<f32>,
-    );
     fn counted_c_tick(
-        decoder: &Decoder<LinearModel>,
-        frame: &RawFrame,
-        zero: &PlanarPose<f32>,
-        reading: &mut Reading,
-    );
-    fn counted_c_uncontracted_tick(
         decoder: &Decoder<LinearModel>,
         frame: &RawFrame,
         zero: &PlanarPose<f32>,
@@ -258,7 +216,7 @@ fn touched(work: impl FnOnce()) -> usize {
 fn check_with(settings: u32) -> Result<(), ArithmeticFault> {
     let set = |fpscr: u32| {
         // SAFETY: writes a register of the FPU; not `pure`, so it stays before and after
-        // the check, whose operands pass through memory.
+        // the check; its operands pass through memory.
         unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) fpscr, options(nostack)) }
     };
     set(settings);
@@ -297,16 +255,13 @@ fn main() -> ! {
         };
         counted_kernel(&c, &signal, &vertical, &zero, &mut pose);
         black_box(&pose);
-        black_box(counted_kernel_by_value(&c, signal, vertical, zero));
         counted_tick(&decoder, &frame, &zero, &mut reading);
         black_box(&reading);
         #[cfg(c_reference)]
         // SAFETY: structs of the same layout, as the C file declares them.
         unsafe {
             counted_c_kernel(&c, &signal, &vertical, &zero, &mut pose);
-            counted_c_uncontracted_kernel(&c, &signal, &vertical, &zero, &mut pose);
             counted_c_tick(&decoder, &frame, &zero, &mut reading);
-            counted_c_uncontracted_tick(&decoder, &frame, &zero, &mut reading);
         }
         let (decoder, zero) = black_box(decoder_of::<FieldModel>(&mut words, k, FIELD_PROBES));
         let c = FieldKernel {
@@ -338,7 +293,7 @@ fn main() -> ! {
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     let mut coded = sensor::frames_16(&frame);
     let mut poses = planar_frames(&reading, 0);
-    // The first tick starts the sequence; from then on every frame is the one that is due.
+    // The first tick starts the sequence; from then on every frame is due.
     for first in sensor::frames_16(&RawFrame {
         sequence: 0,
         ..frame
