@@ -2,7 +2,7 @@
 
 use super::tests::{changed, frame, words};
 use super::*;
-use crate::model::{Sensitivity, planar_pose, sensitivity_at, with_gain};
+use crate::model::{Sensitivity, apply_gain, planar_pose, sensitivity_at};
 
 /// What the table of [`Status`] says, by plain comparisons.
 fn expected(
@@ -15,7 +15,7 @@ fn expected(
     let v = vertical_pose(&c.vertical_per_code, capacitive.map(|code| code as f32));
     let phi = decoder
         .probes()
-        .map(|s| with_gain(sensitivity_at(&s, &v), 0.0));
+        .map(|s| apply_gain(sensitivity_at(&s, &v), 0.0));
     let q = planar_pose(&c.planar_per_code, hall.map(|code| code as f32), phi, zero);
     let not_finite = |x: &f32| !x.is_finite();
     let beyond = |x: [f32; 3], limits: [f32; 3]| {

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 /// One that the crate knows nothing of decodes as its own do:
 ///
 /// ```
-/// # use runtime::model::{LinearModel, Sensitivity, planar_pose, sensitivity_at, with_gain};
+/// # use runtime::model::{LinearModel, Sensitivity, planar_pose, sensitivity_at, apply_gain};
 /// # use runtime::{Decode, Decoder, Model, PlanarPose, RawFrame, VerticalPose, decoder::DecoderConstants, real::Real};
 /// /// phi = eta + a Z + b Rx + c Ry + d Z^2.
 /// #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +53,7 @@ use serde::{Deserialize, Serialize};
 ///     ) -> ([T; 3], PlanarPose<T>) {
 ///         let z2 = vertical.z_m * vertical.z_m;
 ///         let at = |p: &BentProbe<T>| sensitivity_at(&p.linear, vertical) + p.per_z2_m2 * z2;
-///         let phi = [0, 1, 2].map(|k| with_gain(at(&probes[k]), gain_change[k]));
+///         let phi = [0, 1, 2].map(|k| apply_gain(at(&probes[k]), gain_change[k]));
 ///         (phi, planar_pose(pose_rows, signal, phi, zero))
 ///     }
 /// }
@@ -190,7 +190,7 @@ impl<T: Real> Probes<T> {
 
 /// G phi, from G - 1. At G = 1 it is phi, to the bit, if that is finite.
 #[inline(always)]
-pub fn with_gain<T: Real>(phi: T, gain_change: T) -> T {
+pub fn apply_gain<T: Real>(phi: T, gain_change: T) -> T {
     phi + phi * gain_change
 }
 

@@ -24,18 +24,18 @@ pub struct Section {
 ///
 /// A row of SI columns has no capacitive codes and cannot be put into a frame: such a log
 /// gives `None`.
-pub fn of_log(blob: &[u8], dataset: &Dataset, hold: u16) -> Option<Vec<Section>> {
+pub fn log_sections(blob: &[u8], dataset: &Dataset, hold: u16) -> Option<Vec<Section>> {
     let frame_of = |row: &host_fit::input::dataset::Row| row.frame.all_codes();
     let section = |movement: &host_fit::input::dataset::Movement| {
         let rows = dataset.rows.get(movement.rows.clone())?;
         let frames = rows.iter().map(frame_of).collect::<Option<Vec<_>>>()?;
-        Some(of_blob(blob, frames, hold))
+        Some(blob_section(blob, frames, hold))
     };
     dataset.movements.iter().map(section).collect()
 }
 
 /// Frames run by a servo from a blob.
-pub fn of_blob(blob: &[u8], frames: Vec<RawFrame>, hold: u16) -> Section {
+pub fn blob_section(blob: &[u8], frames: Vec<RawFrame>, hold: u16) -> Section {
     let mut parameters = blob.to_vec();
     parameters.resize(blob.len().next_multiple_of(4), 0xff);
     Section {
@@ -57,7 +57,7 @@ pub fn predicted(mut section: Section) -> Section {
 }
 
 /// Frames run by a bare decoder with unchecked parameters.
-pub fn of_words<M: Bare>(decoder: &Decoder<M>, frames: Vec<RawFrame>) -> Section {
+pub fn word_section<M: Bare>(decoder: &Decoder<M>, frames: Vec<RawFrame>) -> Section {
     let mut parameters = Vec::new();
     job::to_words(decoder, &PlanarPose::ZERO, &mut |word| {
         parameters.extend(word.to_le_bytes());
@@ -182,7 +182,7 @@ pub fn field_probe(
 }
 
 /// The set with random temperature coefficients, about 20 degC.
-pub fn with_temperature(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
+pub fn warm_set(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
     let mut set = set.clone();
     let mut pair = || {
         [
@@ -199,7 +199,7 @@ pub fn with_temperature(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet 
 }
 
 /// The parameter set of Model (31) with random terms of the field model added.
-pub fn with_field_terms(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
+pub fn field_set(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
     let (axes, _) = SensingAxes::from_plane(&set.plane);
     let [a, b, c] = set.probes.sensitivities();
     let [across_a, across_b, across_c] = axes.across();

@@ -28,8 +28,8 @@ fn job() -> (Vec<u8>, Vec<u8>) {
     let frames = motion::uniform_frames(&mut rng, 300);
     let wild = motion::wild_frames(&mut rng, 50);
     let sections = [
-        motion::of_words(&linear, frames),
-        motion::of_words(&motion::odd(&mut rng, &field), wild),
+        motion::word_section(&linear, frames),
+        motion::word_section(&motion::odd(&mut rng, &field), wild),
     ];
     let job = to_bytes(&sections);
     let words = words(&job).expect("a job");

@@ -23,7 +23,7 @@
 //! height alone have no slopes and are subtracted from r. At one height the other terms are a
 //! polynomial in u and w.
 
-use super::{Model, Sensitivity, dot, dot_less, with_gain};
+use super::{Model, Sensitivity, apply_gain, dot, dot_less};
 use crate::pose::{PlanarPose, VerticalPose};
 use crate::real::Real;
 
@@ -99,9 +99,9 @@ impl Model for FieldModel {
             change_with(&c.sensitivity, vertical),
         ];
         let phi = [
-            with_gain(a.sensitivity.eta + change[0], gain_change[0]),
-            with_gain(b.sensitivity.eta + change[1], gain_change[1]),
-            with_gain(c.sensitivity.eta + change[2], gain_change[2]),
+            apply_gain(a.sensitivity.eta + change[0], gain_change[0]),
+            apply_gain(b.sensitivity.eta + change[1], gain_change[1]),
+            apply_gain(c.sensitivity.eta + change[2], gain_change[2]),
         ];
         let r = [
             a.first_displacement(signal[0] / phi[0], change[0], vertical),

@@ -14,7 +14,7 @@
 //! and eta = 1 gives (12). So one function decodes them all, and in service, where delta is
 //! zero or what a re-zero measured, the models differ only in their constants.
 
-use super::{Model, dot_less, with_gain};
+use super::{Model, apply_gain, dot_less};
 use crate::pose::{PlanarPose, VerticalPose};
 use crate::real::Real;
 use nalgebra::{Matrix3, Vector3};
@@ -37,9 +37,9 @@ impl Model for LinearModel {
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         let phi = [
-            with_gain(sensitivity_at(&probes[0], vertical), gain_change[0]),
-            with_gain(sensitivity_at(&probes[1], vertical), gain_change[1]),
-            with_gain(sensitivity_at(&probes[2], vertical), gain_change[2]),
+            apply_gain(sensitivity_at(&probes[0], vertical), gain_change[0]),
+            apply_gain(sensitivity_at(&probes[1], vertical), gain_change[1]),
+            apply_gain(sensitivity_at(&probes[2], vertical), gain_change[2]),
         ];
         (phi, planar_pose(pose_rows, signal, phi, zero))
     }

@@ -1,4 +1,4 @@
-//! Bytes as what happens on a bus: mostly frames whose check is right, since no fuzzer finds one.
+//! Bytes become events on a bus: mostly frames with a right check, since no fuzzer finds one.
 
 use embedded_can::{ExtendedId, Frame, StandardId};
 use hal_adapters::can::e2e::{Payload, protect};

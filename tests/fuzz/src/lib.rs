@@ -14,7 +14,7 @@ pub const PARAMS: &[u8] = include_bytes!("../../../runtime/examples/stage.bin");
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// A folder of this process, below that of temporary files; `run` removes it.
+    /// A folder of this process among the temporary files; `run` removes it.
     ///
     /// # Panics
     /// It cannot be made.

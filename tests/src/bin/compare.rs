@@ -95,21 +95,21 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
     };
     let rows = dataset.rows.len();
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
-    let field_set = motion::with_field_terms(&mut rng, &set);
+    let field_set = motion::field_set(&mut rng, &set);
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
-        let warm = motion::with_temperature(&mut rng, set);
+        let warm = motion::warm_set(&mut rng, set);
         let mut buffer = [0; MAX_BYTES];
         let blob = warm.to_bytes(&mut buffer)?;
         let frames = motion::uniform_frames(&mut rng, codes / 2);
-        sections.push(motion::of_blob(blob, frames, hold));
+        sections.push(motion::blob_section(blob, frames, hold));
         let mut buffer = [0; MAX_BYTES];
         let blob = set.to_bytes(&mut buffer)?;
-        let logged = motion::of_log(blob, &dataset, hold)
+        let logged = motion::log_sections(blob, &dataset, hold)
             .ok_or("the log holds a vertical pose in place of capacitive codes")?;
         let mut uniform = |ticks| {
             let frames = motion::uniform_frames(&mut rng, ticks);
-            motion::of_blob(blob, frames, hold)
+            motion::blob_section(blob, frames, hold)
         };
         sections.extend(logged.iter().cloned());
         sections.push(uniform(codes));
@@ -157,11 +157,11 @@ fn bare<M: Bare>(
             decoder
         };
         let frames = motion::uniform_frames(rng, FRAMES_PER_SET);
-        sections.push(motion::of_words(&decoder, frames));
+        sections.push(motion::word_section(&decoder, frames));
     }
     if ticks > 0 {
         let wild = motion::wild_frames(rng, ticks / 8);
-        sections.push(motion::of_words(sound, wild));
+        sections.push(motion::word_section(sound, wild));
     }
     sections
 }

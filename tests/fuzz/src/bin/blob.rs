@@ -1,5 +1,5 @@
-//! A parameter blob, as it is and with the right check behind it: what is accepted decodes any
-//! codes to a pose or to a status that says why not, and is written as the same set.
+//! A parameter blob, unchanged and with the right check behind it. An accepted blob decodes any codes
+//! to a pose or to a status that says why not, and is written as the same set.
 
 #![no_main]
 
