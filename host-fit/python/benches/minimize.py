@@ -6,7 +6,7 @@
 Sphere, Rosenbrock and Rastrigin in 30 dimensions, their minimum of 0 away from the middle of the box, 100,000
 evaluations, medians of five seeds; evaluations a second are by time of the processor. All write their functions with
 NumPy; "batch" gets a population at a time. MEALPY has no batches. SciPy's population is 60 (two for each unknown), all
-others are 50.
+others have 50.
 """
 
 import statistics
@@ -58,7 +58,7 @@ def scipy(vectorized: bool) -> Any:
             fun, bounds, rng=seed, popsize=2, maxiter=EVALUATIONS // 60 - 1, tol=0.0, polish=False,
             updating="deferred", vectorized=vectorized,
         )  # fmt: skip
-        # It counts a batch as one.
+        # SciPy counts a batch as one evaluation.
         return float(found.fun), int(found.nfev) * (60 if vectorized else 1)
 
     return search
@@ -90,7 +90,7 @@ SEARCHES: list[tuple[str, str, Any]] = [
 
 
 def main() -> None:
-    # SciPy says that the function does not take threads.
+    # SciPy warns that it does not use threads.
     warnings.simplefilter("ignore")
     print("| function | search | callback | evaluations | evaluations a second | final value |")
     print("|---|---|---|---|---|---|")

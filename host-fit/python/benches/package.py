@@ -1,10 +1,9 @@
-"""How fast arrays are decoded, on one core, and how a fit compares with that of the program.
+"""The rate of decoding arrays on one core, and the time of a fit by the package and by the program.
 
     python host-fit/python/benches/package.py [target/release/host-fit]
 
-Prints `RESULT key=value` lines, medians of several runs, in time of the processor: other work beside it does not count.
-The fit is of the shipped run of 30 s, reading and writing included; without the path of a program that of the package's
-own environment starts, with Python around it.
+Prints `RESULT key=value` lines, medians of several runs, in processor time. The fit is to the shipped run of 30 s, with
+reading and writing. Without a path it starts the program `host-fit` of the package's own environment.
 """
 
 import os
@@ -25,7 +24,7 @@ ROWS = 2_000_000
 
 
 def seconds(work: Callable[[], object], runs: int = RUNS) -> float:
-    """Time of the processor, all threads and programs that it starts included."""
+    """Processor time of this process and of the programs it starts."""
 
     def now() -> float:
         return sum(os.times()[:4])
@@ -56,14 +55,14 @@ def main() -> None:
     program = sys.argv[1] if len(sys.argv) > 1 else str(Path(sys.executable).parent / "host-fit")
     command: list[str | Path] = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]
 
-    def of_package() -> None:
+    def package() -> None:
         hs.fit(hs.read_log(run30, stage)).save(folder / "own.bin")
 
-    def of_program() -> None:
+    def started() -> None:
         subprocess.run(command, check=True)
 
-    # In turn, so that both meet the same machine.
-    pairs = [(seconds(of_package, 1), seconds(of_program, 1)) for _ in range(RUNS)]
+    # In turn, so that both run under the same load.
+    pairs = [(seconds(package, 1), seconds(started, 1)) for _ in range(RUNS)]
     own, other = (statistics.median(times) for times in zip(*pairs, strict=True))
     assert (folder / "own.bin").read_bytes() == (folder / "p.bin").read_bytes()
     print(f"RESULT fit_package_s={own:.3f} fit_program_s={other:.3f} ratio={own / other:.2f}")

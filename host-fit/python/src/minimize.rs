@@ -1,4 +1,4 @@
-//! The searches of the library on a function of Python.
+//! The searches of the library on a Python function.
 
 use crate::arrays::{reals, slice, table};
 use crate::error::wrong;
@@ -6,21 +6,22 @@ use host_fit::input::stage::Range;
 use host_fit::input::watch::Watch;
 use host_fit::solver::solve::search::cost::{CostFunction, Individual};
 use host_fit::solver::solve::search::kind::SearchKind;
-use host_fit::solver::solve::search::run::{SearchOptions, StopReason};
+use host_fit::solver::solve::search::run::SearchOptions;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use std::sync::Mutex;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A function of Python over a box.
+/// A Python function over a box.
 struct Function<'a> {
     bounds: Vec<Range>,
     fun: &'a Py<PyAny>,
     vectorized: bool,
-    /// The exception that it raised; it is not called again.
-    error: Mutex<Option<PyErr>>,
-    failed: AtomicBool,
+    /// The exception that it raised.
+    error: OnceLock<PyErr>,
+    /// Whether there is one: the interrupt of the search.
+    has_failed: AtomicBool,
 }
 
 impl Function<'_> {
@@ -59,16 +60,6 @@ impl Function<'_> {
         }
         Ok(())
     }
-
-    /// Keeps the first error and ends the search.
-    fn keep(&self, done: PyResult<()>) {
-        if let Err(error) = done {
-            self.failed.store(true, Ordering::Relaxed);
-            if let Ok(mut kept) = self.error.lock() {
-                kept.get_or_insert(error);
-            }
-        }
-    }
 }
 
 /// The error for a value of a wrong type or shape.
@@ -87,30 +78,34 @@ impl CostFunction for Function<'_> {
     }
 
     fn cost(&self, individual: &[f64]) -> f64 {
-        let mut cost = f64::NAN;
-        if !self.failed.load(Ordering::Relaxed) {
-            self.keep(Python::attach(|python| {
-                python.check_signals()?;
-                cost = self.value(python, individual)?;
-                Ok(())
-            }));
-        }
-        cost
+        let mut one = [Individual {
+            place: individual.to_vec(),
+            cost: f64::NAN,
+        }];
+        self.costs(&mut one);
+        one[0].cost
     }
 
-    /// On the caller's thread: Python runs one thread.
+    /// On the caller's thread: Python runs one thread. The first exception ends the search.
     fn costs(&self, individuals: &mut [Individual]) {
         for individual in &mut *individuals {
-            individual.cost = match self.vectorized {
-                true => f64::NAN,
-                false => self.cost(&individual.place),
-            };
+            individual.cost = f64::NAN;
         }
-        if self.vectorized && !self.failed.load(Ordering::Relaxed) {
-            self.keep(Python::attach(|python| {
+        let done = Python::attach(|python| {
+            python.check_signals()?;
+            if self.vectorized {
+                return self.values(python, individuals);
+            }
+            for individual in individuals {
+                individual.cost = self.value(python, &individual.place)?;
                 python.check_signals()?;
-                self.values(python, individuals)
-            }));
+            }
+            Ok(())
+        });
+        if let Err(error) = done {
+            self.has_failed.store(true, Ordering::Relaxed);
+            // The search ends after the first one.
+            let _ = self.error.set(error);
         }
     }
 }
@@ -121,8 +116,8 @@ impl CostFunction for Function<'_> {
 /// ----------
 /// fun : callable
 ///     The function. `fun(x)` gets an array of shape (N,) and returns a number; with `vectorized` it gets
-///     shape (N, S), a column for each place, and returns shape (S,). NaN ranks worst. What it raises ends
-///     the search and reaches the caller.
+///     shape (N, S), a column for each place, and returns shape (S,). NaN ranks worst. An exception of
+///     `fun` ends the search and reaches the caller.
 /// bounds : array_like, shape (N, 2)
 ///     Lower and upper end of each unknown, finite. A place outside is moved to the nearer end.
 /// method : str
@@ -133,7 +128,7 @@ impl CostFunction for Function<'_> {
 /// population : int
 ///     Individuals, from 2 to 100,000; the paper has 100.
 /// maxiter : int
-///     Generations after the first population. TLBO and its relatives evaluate every individual twice in one.
+///     Generations after the first population. Each evaluates two candidates for every individual.
 /// maxfev : int, optional
 ///     Most evaluations. The search ends after the generation that reaches this number.
 /// x0 : array_like, shape (N,), optional
@@ -182,26 +177,23 @@ pub fn minimize<'py>(
         bounds,
         fun: &fun,
         vectorized,
-        error: Mutex::new(None),
-        failed: AtomicBool::new(false),
+        error: OnceLock::new(),
+        has_failed: AtomicBool::new(false),
     };
     let options = SearchOptions {
         first: first.as_slice(),
         evaluations: maxfev.map(|count| count as usize),
         watch: Watch {
-            stop: &function.failed,
+            stop: &function.has_failed,
             ..Watch::NONE
         },
         ..SearchOptions::new(seed, population as usize, maxiter as usize)
     };
     let found = kind.minimize(&function, &options);
-    if let Some(error) = function.error.into_inner().ok().flatten() {
+    if let Some(error) = function.error.into_inner() {
         return Err(error);
     }
-    let mut message = match found.reason {
-        StopReason::Interrupted => "fun failed".to_owned(),
-        reason => reason.to_string(),
-    };
+    let mut message = found.reason.to_string();
     if found.nan_costs > 0 {
         message += &format!(
             "; {} of {} values were NaN",
@@ -217,9 +209,9 @@ pub fn minimize<'py>(
     class.call1((message, success, found.cost, x, generations, evaluations))
 }
 
-/// Most individuals: more than any search makes use of.
+/// Maximum number of individuals: more than any search needs.
 const POPULATION_MAX: u64 = 100_000;
-/// Most generations and evaluations: more than end in a lifetime.
+/// Maximum number of generations and evaluations: more than a lifetime allows.
 const STEPS_MAX: u64 = 1 << 40;
 
 /// A whole number in a range.

@@ -24,14 +24,14 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub(super) struct PlanArgs {
     #[command(flatten)]
     stage: StageFile,
-    /// Length of the run; 20 are plenty for a stage of the usual limits.
+    /// Length of the run in s; 20 s are plenty for a stage with usual limits.
     #[arg(long, value_name = "T", value_parser = seconds, allow_negative_numbers = true, required_unless_present = "temperature")]
     seconds: Option<f64>,
-    /// Show also which logs determine how the stage follows temperature, and what to expect of them. The
-    /// run is the first of them, of 30 s if no length is given.
+    /// Show also the logs that determine the temperature coefficients, and the errors to expect. The run is
+    /// the first log, by default of 30 s.
     #[arg(long)]
     temperature: bool,
-    /// Where to write the trajectory: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row
+    /// Write the trajectory to this file: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row
     /// for every servo period; `-` for standard output.
     #[arg(long, value_name = "run.csv")]
     out: Option<PathBuf>,
@@ -39,8 +39,7 @@ pub(super) struct PlanArgs {
     json: Json,
 }
 
-/// Plans; then writes trajectory and JSON. The optional table [motion] of the stage
-/// file says how the stage may move.
+/// Plans a run within the limits of [motion] in the stage file, and writes trajectory and JSON.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
     super::check_outputs(outputs, &Report::default(), [args.stage.path.as_path()])?;

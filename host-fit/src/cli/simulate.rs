@@ -35,10 +35,10 @@ pub(super) struct SimulateArgs {
     /// Stage and noise. An even seed has magnets as designed, an odd seed imperfect magnets.
     #[arg(long, value_name = "N")]
     seed: u64,
-    /// Where to write the log: CSV, or CSV.gz if the name ends so; `-` for standard output.
+    /// Write the log to this file: CSV, or CSV.gz if the name ends so; `-` for standard output.
     #[arg(long, value_name = "log.csv", default_value = "-")]
     out: PathBuf,
-    /// Where to write the true poses, likewise.
+    /// Write the true poses to this file, likewise.
     #[arg(long, value_name = "truth.csv")]
     truth: Option<PathBuf>,
 }
