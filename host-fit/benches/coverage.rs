@@ -16,13 +16,13 @@ use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, Run};
 use host_fit::simulate::random::{Purpose, Stream};
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solver::problem::Problem;
-use host_fit::solver::problem::model::Model;
-use host_fit::solver::problem::parameters::Parameters;
-use host_fit::solver::solve::field::fit::{FieldFit, fit_field};
-use host_fit::solver::solve::field::parameters::FieldParameters;
-use host_fit::solver::solve::field::probe::probes;
-use host_fit::solver::solve::field::terms::TERMS;
+use host_fit::solver::estimator::field::{FieldFit, fit_field};
+use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::paper::Parameters;
+use host_fit::solver::estimator::parameters::FieldParameters;
+use host_fit::solver::estimator::probe::probes;
+use host_fit::solver::estimator::problem::Problem;
+use host_fit::solver::estimator::terms::TERMS;
 use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, RawFrame, VerticalPose};
 
@@ -44,7 +44,7 @@ fn runs(logs: u64) -> impl Iterator<Item = (u64, Run)> {
 /// Parameters drawn from the prior. Parameters without a prior are drawn near the values of usual stages.
 fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
     let start = Parameters::designed(stage);
-    let mut parameters = FieldParameters::of_model_31(&start, stage);
+    let mut parameters = FieldParameters::from_model_31(&start, stage);
     // x, y of the probes.
     for (values, [x, y]) in parameters.probes.iter_mut().zip(stage.places_m()) {
         let eta = random.between(0.67, 0.93);
@@ -99,7 +99,7 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
 /// The field model, started from Model (31). (Logs made by the field model have no codes to judge.)
 fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(dataset, &all, stage, Model::of(ModelKind::M31));
+    let problem = Problem::new(dataset, &all, stage, Model::from_kind(ModelKind::M31));
     let options = SolverOptions::new(Projection::Linear, 1);
     let start = Solver::LeastSquares.solve(&problem, &options)?.parameters;
     Ok(fit_field(dataset, &all, stage, &start)?)

@@ -10,9 +10,9 @@ use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::{self, LOG_GZ, RUN_GZ, SERVICE_GZ};
 use host_fit::input::stage::Stage;
-use host_fit::solver::problem::model::Model;
+use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::robust::Loss;
 use host_fit::solver::solve::Solver;
-use host_fit::solver::solve::robust::Loss;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::ModelKind;
@@ -74,7 +74,7 @@ fn rms_in_service(
     let settings = FitSettings {
         solver: Solver::Finished,
         loss,
-        ..FitSettings::new(ModelChoice::Named(Model::of(kind)))
+        ..FitSettings::new(ModelChoice::Named(Model::from_kind(kind)))
     };
     Ok(rms(&fit(log, stage, &settings)?.set, service, stage))
 }

@@ -16,10 +16,10 @@ use host_fit::calibration::fit::calibration;
 use host_fit::calibration::judge::{Decoded, Zeros};
 use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::{self, LOG_GZ};
-use host_fit::solver::problem::Problem;
-use host_fit::solver::problem::draw::{Draw, draw_rows};
-use host_fit::solver::problem::model::Model;
-use host_fit::solver::solve::field::parameters::FieldParameters;
+use host_fit::solver::estimator::draw::{Draw, draw_rows};
+use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::parameters::FieldParameters;
+use host_fit::solver::estimator::problem::Problem;
 use host_fit::solver::solve::objective::Objective;
 use host_fit::solver::solve::search::cost::CostFunction;
 use host_fit::solver::solve::search::kind::SearchKind;
@@ -52,7 +52,7 @@ fn main() -> Fallible<()> {
     let dataset = read(LOG_GZ, &stage)?;
     let problem = |draw, seed| {
         let rows = draw_rows(&dataset, ROWS, draw, seed);
-        Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31))
+        Problem::new(&dataset, &rows, &stage, Model::from_kind(ModelKind::M31))
     };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     one.install(|| export(folder, &problem(Draw::Plain, 1)).map_err(|e| e.to_string()))?;
@@ -175,7 +175,7 @@ impl Run {
                 .map(|point| point.evaluations as f64),
         };
         let (stage, parameters) = (problem.stage, &found.parameters);
-        let parameters = FieldParameters::of_model_31(parameters, stage);
+        let parameters = FieldParameters::from_model_31(parameters, stage);
         let made = calibration(&dataset.rows, stage, problem.model.kind, &parameters);
         let set = made.and_then(|made| made.prepare(&Origin::default())).ok();
         let rms = set.map(|set| {

@@ -17,7 +17,7 @@ use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, REST_S, Run};
 use host_fit::simulate::recording::Recording;
 use host_fit::simulate::thermal::{ASSEMBLED_C, Climate};
-use host_fit::solver::solve::field::carry::service_poses;
+use host_fit::solver::estimator::service::service_poses;
 use runtime::ModelKind;
 use runtime::frame::MISSING_CODE;
 
@@ -134,11 +134,14 @@ fn mount_only(stage: &Stage, stages: u64, spacing_k: f64) -> Fallible<Coverage> 
         let [cold, warm] = [(RUN_30, 0.0), (RUN_8, spacing_k)]
             .map(|(run, change_k)| blind(&twin.planned(&run, steady(change_k)), [true, false]));
         let field = twin.fit(&[&cold, &warm])?.field.ok_or("no field model")?;
-        let zero_c = f64::from(field.warmth.temperature.zero_mc[0]) * 1e-3;
+        let zero_c = f64::from(field.temperature.temperature.zero_mc[0]) * 1e-3;
         let truth = twin.change([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
         for (probe, truth) in truth.into_iter().enumerate() {
-            let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
-            all.add(found - truth, field.warmth.error_per_k[probe][0].powi(2));
+            let found = field.temperature.temperature.per_mk[probe][0] * 1e3;
+            all.add(
+                found - truth,
+                field.temperature.error_per_k[probe][0].powi(2),
+            );
         }
     }
     Ok(all)
@@ -197,7 +200,7 @@ fn main() -> Fallible<()> {
         }
         let field = twin.fit(fits[0])?.field.ok_or("no field model")?;
         let [mount, body] = field
-            .warmth
+            .temperature
             .temperature
             .zero_mc
             .map(|mc| f64::from(mc) * 1e-3);
@@ -208,10 +211,10 @@ fn main() -> Fallible<()> {
             };
             let truth = twin.change(at(-0.5), at(0.5));
             for (probe, truth) in truth.into_iter().enumerate() {
-                let found = field.warmth.temperature.per_mk[probe][sensor] * 1e3;
+                let found = field.temperature.temperature.per_mk[probe][sensor] * 1e3;
                 all.add(
                     found - truth,
-                    field.warmth.error_per_k[probe][sensor].powi(2),
+                    field.temperature.error_per_k[probe][sensor].powi(2),
                 );
             }
         }

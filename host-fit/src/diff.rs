@@ -117,7 +117,7 @@ struct Codes {
 
 impl Codes {
     fn new(set: &ParameterSet) -> Option<Self> {
-        let eta = hallstage_solver::problem::parameters::Parameters::of_set(set).eta();
+        let eta = hallstage_solver::estimator::paper::Parameters::from_set(set).eta();
         let m_per_code = f64::from(set.hall.m_per_code);
         let vertical_per_code = from_rows(&set.constants.vertical_per_code).map(f64::from);
         let eta = Matrix3::from_diagonal(&Vector3::from(eta));

@@ -7,7 +7,7 @@ use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solver::problem::model::Model;
+use host_fit::solver::estimator::model::Model;
 use runtime::{ModelKind, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame};
 
 /// The simulated stage, with magnets as designed.

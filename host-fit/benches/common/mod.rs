@@ -12,7 +12,7 @@ use host_fit::simulate::protocol::Run;
 use host_fit::simulate::recording::{Recording, record, record_in};
 use host_fit::simulate::sensors::SensorErrors;
 use host_fit::simulate::thermal::{Climate, Thermal};
-use host_fit::solver::problem::model::Model;
+use host_fit::solver::estimator::model::Model;
 use runtime::{ModelKind, ParameterSet};
 use std::error::Error;
 use std::time::Instant;
@@ -86,7 +86,7 @@ pub fn dataset(recording: &Recording, stage: &Stage) -> Dataset {
 }
 
 pub fn fitted(dataset: &Dataset, stage: &Stage, kind: ModelKind) -> Fallible<Fit> {
-    let model = ModelChoice::Named(Model::of(kind));
+    let model = ModelChoice::Named(Model::from_kind(kind));
     Ok(fit(dataset, stage, &FitSettings::new(model))?)
 }
 

@@ -11,7 +11,7 @@ use host_fit::input::finding::Severity;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::Sample;
-use host_fit::solver::solve::field::parameters::FieldParameters;
+use host_fit::solver::estimator::parameters::FieldParameters;
 use runtime::ParameterSet;
 
 /// A name, whether the fault stays in service, and the change of a sample: at a share of the log, and by its

@@ -45,8 +45,8 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::fit::FieldFigures;
+use hallstage_solver::estimator::field::FieldFigures;
+use hallstage_solver::estimator::model::Model;
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, Text};
 use runtime::{Calibration, ParameterSet};
@@ -112,7 +112,7 @@ impl Fit {
         };
         let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
         let decoded = Decoded::new(&set, dataset);
-        let judgement = decoded.judge(dataset, stage, Zeros::of_model(model));
+        let judgement = decoded.judge(dataset, stage, Zeros::for_model(model));
         let train_rows = u32::try_from(fitted.numbers.len()).unwrap_or(u32::MAX);
         set.fit = judgement.record(train_rows);
         Ok(Self {
@@ -146,7 +146,7 @@ impl Fit {
         for row in self.fitted.outliers() {
             decoded.errors[row] = None;
         }
-        let zeros = Zeros::of_model(self.model);
+        let zeros = Zeros::for_model(self.model);
         decoded.judge(dataset, stage, zeros).errors
     }
 

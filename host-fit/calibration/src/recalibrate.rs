@@ -12,10 +12,10 @@
 //! # let dataset = reading.dataset;
 //! # use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 //! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
-//! use hallstage_calibration::recalibrate::{Known, recalibrate};
-//! use hallstage_solver::solve::field::update::Change;
+//! use hallstage_calibration::recalibrate::{StoredPosterior, recalibrate};
+//! use hallstage_solver::estimator::update::Change;
 //!
-//! let known = Known::from_fit(&fit);
+//! let known = StoredPosterior::from_fit(&fit);
 //! let created = "2026-11-23".try_into()?;
 //! let new = recalibrate(&fit.set, known.as_ref(), &dataset, &stage, Change::Gains, created)?;
 //! let (change, standard_error) = new.gains[0];
@@ -34,15 +34,15 @@ use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::carry::ServiceVariance;
-use hallstage_solver::solve::field::error::FieldFitError;
-use hallstage_solver::solve::field::noise::USUAL_DRIFT_MM;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::posterior::Posterior;
-use hallstage_solver::solve::field::terms::COUNT;
-use hallstage_solver::solve::field::update::{Change, update};
-use hallstage_solver::solve::field::whiten::Noise;
+use hallstage_solver::estimator::error::FieldFitError;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::noise::USUAL_DRIFT_MM;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::posterior::Posterior;
+use hallstage_solver::estimator::service::ServiceVariance;
+use hallstage_solver::estimator::terms::COUNT;
+use hallstage_solver::estimator::update::{Change, update};
+use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
@@ -57,7 +57,7 @@ const OPEN_MAX_GAINS: f64 = 0.05;
 const OPEN_MAX_ALL: f64 = 0.21;
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Known {
+pub struct StoredPosterior {
     /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`].
     pub covariance: DMatrix<f64>,
     /// The noise of the log.
@@ -69,7 +69,7 @@ pub struct Known {
     pub repaired: Vec<String>,
 }
 
-impl Known {
+impl StoredPosterior {
     /// Of a fit; `None` of other models than the field model.
     pub fn from_fit(fit: &Fit) -> Option<Self> {
         let figures = fit.field.as_ref()?;
@@ -89,7 +89,7 @@ pub struct Recalibration {
     /// What goes into the blob.
     pub set: ParameterSet,
     /// What goes beside it; `None` without an old one.
-    pub known: Option<Known>,
+    pub known: Option<StoredPosterior>,
     /// Change of the gain of A, B, C, in parts of the old one, with its standard error.
     pub gains: [(f64, f64); 3],
     /// Errors predicted for service with the new blob, over the noise floor: X, Y, Rz.
@@ -217,23 +217,23 @@ const fn remedy(change: Change) -> &'static str {
 /// See [`RecalibrateError`].
 pub fn recalibrate(
     old: &ParameterSet,
-    known: Option<&Known>,
+    known: Option<&StoredPosterior>,
     dataset: &Dataset,
     stage: &Stage,
     change: Change,
     created: Text,
 ) -> Result<Recalibration, RecalibrateError> {
     let old_parameters =
-        FieldParameters::of_set(old, stage).ok_or_else(|| RecalibrateError::OtherModel {
-            model: Model::of(old.model).title(),
+        FieldParameters::from_set(old, stage).ok_or_else(|| RecalibrateError::OtherModel {
+            model: Model::from_kind(old.model).title(),
         })?;
     let temperature = old.constants.temperature.rounded::<f64>();
     if known.is_none() && matches!(change, Change::All | Change::Temperature) {
         return Err(RecalibrateError::NothingKnown);
     }
     if change == Change::Temperature {
-        let with_warmth = known.is_some_and(|known| known.covariance.nrows() > COUNT);
-        if !temperature.is_used() || !with_warmth {
+        let with_temperature = known.is_some_and(|known| known.covariance.nrows() > COUNT);
+        if !temperature.is_used() || !with_temperature {
             return Err(RecalibrateError::NoTemperature("the blob"));
         }
     }
@@ -273,7 +273,7 @@ pub fn recalibrate(
     let service = expected(&update.parameters, &update.posterior);
     let open_before = covariance.map_or([0.0; 3], |covariance| {
         let posterior =
-            Posterior::of_parameters(covariance.clone(), &old_parameters, &update.noise);
+            Posterior::from_covariance(covariance.clone(), &old_parameters, &update.noise);
         expected(&old_parameters, &posterior).systematic
     });
     let open_max = match change {
@@ -318,7 +318,7 @@ pub fn recalibrate(
     };
     Ok(Recalibration {
         set: ParameterSet { fit, ..set },
-        known: known.map(|known| Known {
+        known: known.map(|known| StoredPosterior {
             covariance: update.posterior.covariance.clone(),
             noise: update.noise,
             misfit: known.misfit,

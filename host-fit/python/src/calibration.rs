@@ -12,16 +12,16 @@ use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
-use host_fit::calibrate::{Outcome, Updated, other_scales, warnings_of};
+use host_fit::calibrate::{Outcome, Updated, log_warnings, other_scales};
 use host_fit::calibration::fit::Fit;
-use host_fit::calibration::recalibrate::Known;
+use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
 use host_fit::report::errors::{errors, from_rms_and_peak};
 use host_fit::report::result::Report;
-use host_fit::solver::problem::model::Model;
-use host_fit::solver::solve::field::update::Change;
+use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::update::Change;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -36,7 +36,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "hallstage")]
 pub struct Calibration {
     set: ParameterSet,
-    known: Option<Known>,
+    known: Option<StoredPosterior>,
     /// The stage, with the columns of the log that was fitted.
     designed: Arc<Designed>,
     stage: Py<Stage>,
@@ -149,7 +149,7 @@ impl Calibration {
     /// Equation of the model: "12", "15", "30", "31", or "field".
     #[getter]
     fn model(&self) -> &'static str {
-        Model::of(self.set.model).name
+        Model::from_kind(self.set.model).name
     }
 
     /// Serial number of the stage.
@@ -357,14 +357,14 @@ impl Calibration {
                 (log, &self.designed),
                 stage_file,
                 of.outcome.subject(),
-                (warnings_of(log), &blob),
+                (log_warnings(log), &blob),
                 report,
             )
         })
     }
 
     fn __repr__(&self) -> String {
-        let model = Model::of(self.set.model).title();
+        let model = Model::from_kind(self.set.model).title();
         let of = match self.set.serial.as_str() {
             "" => String::new(),
             serial => format!(" of {serial}"),

@@ -4,13 +4,13 @@ use crate::arrays::{codes, reals, same_rows, slice};
 use crate::error::{of_blob, of_log, of_posterior, wrong};
 use crate::log::Log;
 use crate::work;
-use host_fit::calibration::recalibrate::Known;
+use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::{LogReading, ReadOptions};
 use host_fit::output::pose_file::uncertainty;
 use host_fit::output::{blob_file, posterior_file};
-use host_fit::solver::problem::model::Model;
-use host_fit::solver::solve::field::parameters::FieldParameters;
-use host_fit::solver::solve::field::posterior::Posterior;
+use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::parameters::FieldParameters;
+use host_fit::solver::estimator::posterior::Posterior;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -43,11 +43,11 @@ const ROWS_AT_ONCE: usize = 1 << 18;
 pub struct Decoder {
     set: ParameterSet,
     decoder: AnyDecoder,
-    known: Option<Known>,
+    known: Option<StoredPosterior>,
 }
 
 impl Decoder {
-    pub fn new(set: ParameterSet, known: Option<Known>) -> Self {
+    pub fn new(set: ParameterSet, known: Option<StoredPosterior>) -> Self {
         Self {
             decoder: set.decoder(),
             set,
@@ -170,7 +170,7 @@ impl Decoder {
     /// Equation of the model: "12", "15", "30", "31", or "field".
     #[getter]
     fn model(&self) -> &'static str {
-        Model::of(self.set.model).name
+        Model::from_kind(self.set.model).name
     }
 
     /// Serial number of the stage.
@@ -186,7 +186,7 @@ impl Decoder {
     }
 
     fn __repr__(&self) -> String {
-        let (model, serial) = (Model::of(self.set.model).title(), &self.set.serial);
+        let (model, serial) = (Model::from_kind(self.set.model).title(), &self.set.serial);
         match serial.as_str() {
             "" => format!("<Decoder, {model}>"),
             serial => format!("<Decoder of {serial}, {model}>"),
@@ -196,8 +196,8 @@ impl Decoder {
 
 impl Decoder {
     fn posterior(&self) -> PyResult<Posterior> {
-        let parameters = FieldParameters::of_blob(&self.set).ok_or_else(|| {
-            let model = Model::of(self.set.model).name;
+        let parameters = FieldParameters::from_blob(&self.set).ok_or_else(|| {
+            let model = Model::from_kind(self.set.model).name;
             wrong(
                 "model",
                 format!("({model}) does not know its errors in service; fit the field model"),
@@ -210,7 +210,7 @@ impl Decoder {
             )
         })?;
         let covariance = known.covariance.clone();
-        Ok(Posterior::of_parameters(
+        Ok(Posterior::from_covariance(
             covariance,
             &parameters,
             &known.noise,
@@ -239,7 +239,7 @@ impl Decoder {
 }
 
 /// A blob, and what stands beside it.
-pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<Known>)> {
+pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<StoredPosterior>)> {
     let set = blob_file::read(path).map_err(|error| of_blob(&error))?;
     let beside = posterior_file::beside(path).filter(|path| path.exists());
     let known = beside.map(|beside| posterior_file::read(&beside, &set, path));

@@ -9,7 +9,7 @@ use crate::stage::Stage;
 use crate::work;
 use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated};
 use host_fit::calibration::judge::Zeros;
-use host_fit::calibration::recalibrate::Known;
+use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::report::errors::errors;
 use host_fit::report::result::Report;
@@ -37,7 +37,7 @@ impl Evaluation {
     pub fn new(
         py: Python<'_>,
         log: &Log,
-        of_blob: (&ParameterSet, Option<&Known>),
+        of_blob: (&ParameterSet, Option<&StoredPosterior>),
         blob: Vec<u8>,
         (delta, limit): (Option<&str>, Option<f64>),
     ) -> PyResult<Self> {

@@ -6,12 +6,12 @@ use crate::error::{of_calibrate, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
-use host_fit::calibrate::{FitOrder, Limits, check_refusal, loss_of};
+use host_fit::calibrate::{FitOrder, Limits, check_refusal, choose_loss};
 use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
-use host_fit::solver::problem::draw::Draw;
-use host_fit::solver::problem::parameters::Parameters;
-use host_fit::solver::solve::robust::Loss;
+use host_fit::solver::estimator::draw::Draw;
+use host_fit::solver::estimator::paper::Parameters;
+use host_fit::solver::estimator::robust::Loss;
 use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -104,7 +104,7 @@ pub fn fit(
     let solver = chosen::<Solver>("solver", solver)?;
     let project = chosen::<Projection>("project", project)?;
     let loss = loss.map(|name| chosen::<Loss>("loss", name)).transpose()?;
-    let loss = loss_of(loss, model, solver, project);
+    let loss = choose_loss(loss, model, solver, project);
     let loss = loss.map_err(|mismatch| wrong(mismatch.argument, mismatch.problem))?;
     let usual = SolverOptions::new(project, seed);
     let population = within("population", population, 4, 100_000)?;
@@ -120,7 +120,7 @@ pub fn fit(
             options: SolverOptions {
                 population: population.unwrap_or(usual.population),
                 generations: generations.unwrap_or(usual.generations),
-                known: start.map(|start| Parameters::of_set(start.set())),
+                known: start.map(|start| Parameters::from_set(start.set())),
                 watch: WATCH,
                 ..usual
             },

@@ -5,7 +5,7 @@ use crate::choice::chosen;
 use crate::error::{of_arrays, of_log, wrong};
 use crate::stage::Stage;
 use crate::work;
-use host_fit::calibrate::warnings_of;
+use host_fit::calibrate::log_warnings;
 use host_fit::input::dataset::Row;
 use host_fit::input::log::layout::LogLayout;
 use host_fit::input::log::{
@@ -200,7 +200,7 @@ impl Log {
     /// What is odd about the logs, in words.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        warnings_of(&self.reading)
+        log_warnings(&self.reading)
     }
 
     /// Time of the rows within their log, us: int64, (n,).

@@ -1,11 +1,11 @@
 //! What is known of the parameters of a calibration: values, standard errors, covariance.
 
 use host_fit::calibration::fit::Fit;
-use host_fit::calibration::recalibrate::Known;
+use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::diff::{parameter_changes, pose_difference};
 use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
 use host_fit::report::result::Report;
-use host_fit::solver::solve::field::terms;
+use host_fit::solver::estimator::terms;
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 /// A blob, what stands beside it, and the fit that it comes from, where there is one.
 pub struct Statistics<'a> {
     pub set: &'a ParameterSet,
-    pub known: Option<&'a Known>,
+    pub known: Option<&'a StoredPosterior>,
     pub fit: Option<(&'a Report, &'a Fit)>,
 }
 

@@ -1,6 +1,6 @@
-//! The estimation problem of a Hall-sensor array and its solvers.
+//! The estimator of a Hall-sensor array's parameters, and the searches of the paper.
 #![forbid(unsafe_code)]
 
-pub mod problem;
+pub mod estimator;
 pub mod solve;
 pub mod statistics;

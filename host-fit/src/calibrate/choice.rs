@@ -6,10 +6,10 @@ use hallstage_calibration::fit::ModelChoice;
 use hallstage_calibration::judge::Zeros;
 use hallstage_input::log::BadRows;
 use hallstage_simulate::protocol::Protocol;
-use hallstage_solver::problem::draw::Draw;
-use hallstage_solver::problem::model::MODELS;
-use hallstage_solver::solve::field::update::Change;
-use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::estimator::draw::Draw;
+use hallstage_solver::estimator::model::MODELS;
+use hallstage_solver::estimator::robust::Loss;
+use hallstage_solver::estimator::update::Change;
 use hallstage_solver::solve::{Projection, Solver};
 
 /// A setting that is chosen by name.

@@ -1,6 +1,6 @@
 //! A blob judged on logs with reference.
 
-use super::warnings_of;
+use super::log_warnings;
 use crate::report::errors::RowErrors;
 use crate::report::result::{Circumstances, Judged, Report};
 use crate::report::verdict::{End, Subject};
@@ -9,15 +9,15 @@ use hallstage_calibration::fit::counted;
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
-use hallstage_calibration::recalibrate::Known;
+use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
 use hallstage_input::axis::{PLANAR, sign};
 use hallstage_input::finding::Severity;
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
 
 /// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.
@@ -69,19 +69,19 @@ impl Evaluation {
     /// # Errors
     /// The errors of `read`.
     pub fn new(
-        (set, known): (&ParameterSet, Option<&Known>),
+        (set, known): (&ParameterSet, Option<&StoredPosterior>),
         stage: &Stage,
         order: EvalOrder,
         logs: usize,
         read: impl FnOnce(&mut dyn FnMut(usize, &LogRow)) -> Result<LogReading, LogError>,
     ) -> Result<Self, LogError> {
-        let mut judge = Judge::new(&Parameters::of_set(set), stage, logs);
+        let mut judge = Judge::new(&Parameters::from_set(set), stage, logs);
         let decoder = set.decoder();
         let log = read(&mut |log, row| {
             let error = error(&decoder, &row.row);
             judge.take((log, row.movement, row.begins), &row.row, error);
         })?;
-        let own_zeros = Zeros::of_model(Model::of(set.model));
+        let own_zeros = Zeros::for_model(Model::from_kind(set.model));
         let zeros = order.zeros.unwrap_or(own_zeros);
         let judgement = judge.clone().judgement(zeros);
         let decoded = Decoded::new(set, &log.dataset);
@@ -91,7 +91,7 @@ impl Evaluation {
         let blob_use = BlobUse::Evaluated { is_refitted };
         let mut diagnosis = diagnose_blob(&log.dataset, stage, set, blob_use);
         diagnosis.validity = known.and_then(|known| {
-            let parameters = FieldParameters::of_set(set, stage)?;
+            let parameters = FieldParameters::from_set(set, stage)?;
             let (white_mm, covariance) = (known.noise.white_mm, &known.covariance);
             Validity::new(stage, &parameters, white_mm, covariance)
         });
@@ -116,7 +116,7 @@ impl Evaluation {
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
         let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
-        let mut warnings = warnings_of(&self.log);
+        let mut warnings = log_warnings(&self.log);
         warnings.extend(counts.map(|found| words::message(&found)));
         let circumstances = Circumstances {
             warnings,

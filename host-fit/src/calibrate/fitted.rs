@@ -6,7 +6,7 @@ use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::of_fit as of_residuals;
 use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
 use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
-use hallstage_calibration::recalibrate::Known;
+use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
 use hallstage_input::finding::Severity;
 use hallstage_input::log::LogReading;
@@ -147,9 +147,9 @@ impl Outcome {
     }
 
     /// What goes beside the blob: what is known of a field model; `None` of others.
-    pub fn known(&self) -> Option<Known> {
-        let known = Known::from_fit(self.fitted.as_ref().ok()?)?;
-        Some(Known {
+    pub fn known(&self) -> Option<StoredPosterior> {
+        let known = StoredPosterior::from_fit(self.fitted.as_ref().ok()?)?;
+        Some(StoredPosterior {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
             ..known
         })

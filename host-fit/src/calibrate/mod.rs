@@ -14,7 +14,7 @@ pub use evaluation::{EvalOrder, Evaluation};
 pub use fitted::{CalibrateError, FitOrder, Outcome};
 pub use limit::Limits;
 pub use recalibration::Updated;
-pub use settings::{Mismatch, loss_of};
+pub use settings::{Mismatch, choose_loss};
 
 use crate::report::errors::errors;
 use crate::report::figure::{Group, group};
@@ -33,7 +33,7 @@ use serde_json::json;
 pub const NOT_WRITTEN: &str = "the fit failed its own checks, and no parameter blob was written: ";
 
 /// The warnings of a log that is diagnosed, which reports another rate itself.
-pub fn warnings_of(log: &LogReading) -> Vec<String> {
+pub fn log_warnings(log: &LogReading) -> Vec<String> {
     words::messages(&log.warnings)
 }
 
@@ -108,7 +108,7 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
         "model" => fit.map(|fit| fit.model.name),
         "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
         "failure" => json!(fitted.err().map(ToString::to_string)),
-        "warnings" => json!(warnings_of(log)),
+        "warnings" => json!(log_warnings(log)),
         "verdict" => json!(diagnosis.verdict),
         "predicted" => json!(diagnosis.predicted),
         "findings" => json!(words::worded(&diagnosis.findings)),

@@ -1,16 +1,18 @@
 //! What is said of a calibration that was brought up to date.
 
-use super::warnings_of;
+use super::log_warnings;
 use crate::report::errors::{errors, pose};
 use crate::report::figure::{Group, figure, group};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::fit::codes_refused;
-use hallstage_calibration::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
+use hallstage_calibration::recalibrate::{
+    RecalibrateError, Recalibration, StoredPosterior, recalibrate,
+};
 use hallstage_calibration::words;
 use hallstage_input::finding::Severity;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::update::Change;
+use hallstage_solver::estimator::update::Change;
 use runtime::ParameterSet;
 use runtime::parameters::Text;
 use serde_json::json;
@@ -34,7 +36,7 @@ impl Updated {
     /// # Errors
     /// See [`RecalibrateError`].
     pub fn new(
-        (old, known): (&ParameterSet, Option<&Known>),
+        (old, known): (&ParameterSet, Option<&StoredPosterior>),
         log: &LogReading,
         stage: &Stage,
         change: Change,
@@ -65,7 +67,7 @@ impl Updated {
 }
 
 fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
-    let mut warnings = warnings_of(log);
+    let mut warnings = log_warnings(log);
     let refused = codes_refused(new.judgement.undecoded);
     warnings.extend(refused.as_ref().map(words::message));
     if new.known.is_none() {

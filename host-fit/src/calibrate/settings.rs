@@ -2,7 +2,7 @@
 //! be fitted.
 
 use hallstage_calibration::fit::ModelChoice;
-use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::estimator::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver};
 use runtime::ModelKind;
 
@@ -20,7 +20,7 @@ pub struct Mismatch {
 ///
 /// # Errors
 /// [`Mismatch`] where settings do not go together.
-pub fn loss_of(
+pub fn choose_loss(
     loss: Option<Loss>,
     model: ModelChoice,
     solver: Solver,

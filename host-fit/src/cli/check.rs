@@ -3,7 +3,7 @@
 use super::args::{Json, Logs};
 use super::interrupt;
 use super::report::{Report, finish};
-use crate::calibrate::{check_refusal, checked, warnings_of};
+use crate::calibrate::{check_refusal, checked, log_warnings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -77,7 +77,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         let judged = Judged {
             set: &fit.set,
             judgement: &fit.judgement,
-            zeros: Zeros::of_model(fit.model),
+            zeros: Zeros::for_model(fit.model),
             by_row: &by_row,
             over_rows: fit.judgement.errors,
         };
@@ -95,6 +95,6 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     if why.is_none() && findings.iter().all(is_note) {
         terminal::print("no fault found\n")?;
     }
-    finish(outputs, &checked.tables(), &warnings_of(&log), &subject)?;
+    finish(outputs, &checked.tables(), &log_warnings(&log), &subject)?;
     why.map_or(Ok(()), |why| Err(HostError::rejected(why)))
 }

@@ -12,9 +12,9 @@ use crate::output::posterior_file::{self, PosteriorFileError};
 use clap::Args;
 use hallstage_calibration::words;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::posterior::Posterior;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::posterior::Posterior;
 use runtime::{OnInvalid, ParameterSet};
 use std::path::{Path, PathBuf};
 
@@ -84,20 +84,20 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
 
 /// What is known of a blob's errors, from the file beside it.
 fn posterior(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<Posterior, HostError> {
-    let parameters = FieldParameters::of_set(set, stage);
+    let parameters = FieldParameters::from_set(set, stage);
     let parameters = parameters.ok_or_else(|| {
         HostError::input(format!(
             "{} is of model ({}), which does not know its errors in service: they are several times those on the log that \
              it was fitted to. Fit the field model (--model field), or leave --uncertainty out",
             blob.display(),
-            Model::of(set.model).name
+            Model::from_kind(set.model).name
         ))
     })?;
     let path = posterior_file::beside(blob).ok_or_else(|| PosteriorFileError::Missing {
         path: blob.to_owned(),
     })?;
     let known = posterior_file::read(&path, set, blob)?;
-    Ok(Posterior::of_parameters(
+    Ok(Posterior::from_covariance(
         known.covariance,
         &parameters,
         &known.noise,

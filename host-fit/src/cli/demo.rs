@@ -14,7 +14,7 @@ use hallstage_calibration::judge::precision::largest_difference;
 use hallstage_calibration::judge::statistics::over_noise;
 use hallstage_calibration::judge::{Decoded, Zeros};
 use hallstage_calibration::plan::plan;
-use hallstage_calibration::recalibrate::Known;
+use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::log::{self, ReadOptions};
 use hallstage_input::shipped::{FILES, STAGE_TOML};
@@ -24,9 +24,9 @@ use hallstage_simulate::protocol::{Protocol, REST_S, Run};
 use hallstage_simulate::recording::{Recording, record_in};
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_simulate::thermal::{Climate, Thermal};
-use hallstage_solver::problem::model::Model;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::robust::Loss;
 use hallstage_solver::solve::Solver;
-use hallstage_solver::solve::robust::Loss;
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::ProbeGeometry;
 use runtime::tracker::OnInvalid;
@@ -68,7 +68,7 @@ fn table_7() -> BTreeMap<String, f64> {
     let b = [-69.7432, -56.7511, -63.4133];
     let c = [14.8664, -55.0764, 12.7241];
     let values = [arms, theta, eta, a, b, c].concat();
-    let ids = Model::of(ModelKind::M31).parameters();
+    let ids = Model::from_kind(ModelKind::M31).parameters();
     ids.map(|id| (id.name(), values[id.index])).collect()
 }
 
@@ -137,7 +137,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         let settings = FitSettings {
             solver: Solver::Finished,
             loss: Loss::None,
-            ..FitSettings::new(ModelChoice::Named(Model::of(kind)))
+            ..FitSettings::new(ModelChoice::Named(Model::from_kind(kind)))
         };
         fit(dataset, &stage, &settings)
     };
@@ -155,7 +155,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
 
     let mut outputs = Outputs::default();
     posterior_file::add_calibration(&mut outputs, &files[4], &model_31.set, None)?;
-    let known = Known::from_fit(&field);
+    let known = StoredPosterior::from_fit(&field);
     posterior_file::add_calibration(&mut outputs, &files[6], &field.set, known.as_ref())?;
     outputs.commit()?;
     let decoding = DecodeSettings {
@@ -258,7 +258,7 @@ fn day(stage: &Stage) -> Result<String, HostError> {
     let day = day.dataset_with_truth(stage).unwrap_or_default();
     let ratios = |logs: &[&Recording]| -> Result<String, HostError> {
         let dataset = Recording::joined(logs, stage).unwrap_or_default();
-        let model = ModelChoice::Named(Model::of(ModelKind::Field));
+        let model = ModelChoice::Named(Model::from_kind(ModelKind::Field));
         let fit = fit(&dataset, stage, &FitSettings::new(model))?;
         let errors = Decoded::new(&fit.set, &day).rezeroed(&day, REST_S);
         let [x, y, rz] = over_noise(&errors, &day.movements);

@@ -10,8 +10,8 @@ use crate::output::{blob_file, posterior_file};
 use crate::report::figure::{Group, group};
 use crate::report::text::as_text;
 use clap::Args;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::terms::names;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::terms::names;
 use runtime::{ModelKind, ParameterSet};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
 fn blob(path: &Path, set: &ParameterSet) -> Group {
     group! {
         "file" => path.display().to_string(),
-        "model" => Model::of(set.model).name,
+        "model" => Model::from_kind(set.model).name,
         "serial" => set.serial.as_str(),
         "created" => set.created.as_str(),
         "rows" => set.fit.rows,

@@ -4,7 +4,7 @@ use super::args::{Json, Logs, Threads, blob_text};
 use super::arguments::{choice, train};
 use super::interrupt;
 use super::report::finish;
-use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
+use crate::calibrate::{FitOrder, Limits, checked, choose_loss, log_warnings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
@@ -16,9 +16,9 @@ use clap::Args;
 use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
 use hallstage_input::log::{BadRows, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::draw::Draw;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::estimator::draw::Draw;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::parameters::Text;
 use std::path::PathBuf;
@@ -93,7 +93,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     let inputs = args.logs.inputs().chain(args.start.as_deref());
     super::check_outputs(outputs, &args.report, inputs)?;
-    let loss = loss_of(args.loss, args.model, args.solver, args.project);
+    let loss = choose_loss(args.loss, args.model, args.solver, args.project);
     let loss = loss.map_err(HostError::of_mismatch)?;
     interrupt::watch();
     let stage = args.logs.stage.read()?;
@@ -126,7 +126,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let subject = outcome.subject();
     args.report
         .add(&mut outputs, || source(args, of_log, subject, found))?;
-    let warnings = warnings_of(&log);
+    let warnings = log_warnings(&log);
     let (Some((fit, report)), true) = (found, outcome.has_blob) else {
         finish(outputs, &[], &warnings, &subject)?;
         let cause = outcome.refusal.unwrap_or_default();
@@ -162,7 +162,7 @@ fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
     let options = SolverOptions {
         population: args.population.map_or(usual.population, |n| n as usize),
         generations: args.generations.map_or(usual.generations, |n| n as usize),
-        known: start.as_ref().map(Parameters::of_set),
+        known: start.as_ref().map(Parameters::from_set),
         watch: interrupt::watch(),
         ..usual
     };

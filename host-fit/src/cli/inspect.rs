@@ -12,8 +12,8 @@ use crate::report::provenance::hex;
 use crate::report::text::as_text;
 use clap::Args;
 use hallstage_input::axis::{AXES, Axis};
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::posterior::warmth_errors;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::posterior::temperature_errors;
 use runtime::matrix::to_rows;
 use runtime::{ModelKind, ParameterSet};
 use serde_json::{Value, json};
@@ -41,7 +41,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
     let errors = known
         .as_ref()
-        .and_then(|known| warmth_errors(&known.covariance));
+        .and_then(|known| temperature_errors(&known.covariance));
     let mut figures = figures(&set, errors.map(|errors| json!(errors)));
     let repaired = known.map(|known| known.repaired);
     figures.set("repaired", json!(repaired));
@@ -97,7 +97,7 @@ fn figures(set: &ParameterSet, errors_per_k: Option<Value>) -> Group {
     };
     let mut figures = group! {
         "layout_version" => u32::from(set.layout_version()),
-        "model" => Model::of(set.model).name,
+        "model" => Model::from_kind(set.model).name,
         "serial" => set.serial.as_str(),
         "created" => set.created.as_str(),
         "logs_sha256" => hex(&set.logs_sha256),

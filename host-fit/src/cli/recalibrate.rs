@@ -8,10 +8,10 @@ use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
 use clap::Args;
-use hallstage_calibration::recalibrate::{Known, RecalibrateError};
+use hallstage_calibration::recalibrate::{RecalibrateError, StoredPosterior};
 use hallstage_input::log::ReadOptions;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::update::Change;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::update::Change;
 use runtime::parameters::Text;
 use runtime::{ModelKind, ParameterSet};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     )?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     if old.model != ModelKind::Field {
-        let model = Model::of(old.model).title();
+        let model = Model::from_kind(old.model).title();
         return Err(RecalibrateError::OtherModel { model }.into());
     }
     let known = match &old_posterior {
@@ -89,7 +89,7 @@ fn read_known(
     path: &Path,
     old: &ParameterSet,
     args: &RecalibrateArgs,
-) -> Result<Option<Known>, HostError> {
+) -> Result<Option<StoredPosterior>, HostError> {
     match posterior_file::read(path, old, &args.params) {
         Ok(known) => Ok(Some(known)),
         Err(PosteriorFileError::Missing { .. })

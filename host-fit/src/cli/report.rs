@@ -1,7 +1,7 @@
 //! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
 
 use super::args::{Logs, blob_text};
-use crate::calibrate::warnings_of;
+use crate::calibrate::log_warnings;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, make_folder};
@@ -71,7 +71,7 @@ impl Report {
             stage,
             dataset: &log.dataset,
             provenance,
-            warnings: warnings_of(log),
+            warnings: log_warnings(log),
             report: None,
         }
     }

@@ -17,10 +17,10 @@
 
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
-use hallstage_calibration::recalibrate::Known;
+use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::source::{SourceError, SourceProblem, read_whole};
-use hallstage_solver::solve::field::terms::COUNT;
-use hallstage_solver::solve::field::whiten::Noise;
+use hallstage_solver::estimator::terms::COUNT;
+use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
 use runtime::ParameterSet;
 use sha2::{Digest, Sha256};
@@ -93,7 +93,7 @@ pub fn add_calibration(
     outputs: &mut Outputs,
     path: &Path,
     set: &ParameterSet,
-    known: Option<&Known>,
+    known: Option<&StoredPosterior>,
 ) -> Result<(), OutputError> {
     let blob = blob_file::to_bytes(path, set)?;
     match (known, beside(path)) {
@@ -110,7 +110,11 @@ pub fn add_calibration(
 ///
 /// # Errors
 /// See [`PosteriorFileError`].
-pub fn read(path: &Path, set: &ParameterSet, blob: &Path) -> Result<Known, PosteriorFileError> {
+pub fn read(
+    path: &Path,
+    set: &ParameterSet,
+    blob: &Path,
+) -> Result<StoredPosterior, PosteriorFileError> {
     let most = (self::bytes(ROWS_MAX) + TEXT_BYTES_MAX) as u64;
     let bytes = match read_whole(path, most) {
         Err(error) if matches!(error.problem, SourceProblem::NotFound) => {
@@ -138,9 +142,9 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError>
     Ok(Sha256::digest(set.to_bytes(&mut buffer)?).into())
 }
 
-fn encode(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
+fn encode(blob: &[u8; HASH_BYTES], known: &StoredPosterior) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let Known {
+    let StoredPosterior {
         covariance,
         noise: Noise { white_mm, drift_mm },
         misfit,
@@ -167,7 +171,7 @@ fn encode(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
 }
 
 /// The hash of the blob and what is known, or what is wrong.
-fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
+fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], StoredPosterior), String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("it does not begin with HALLPOST".to_owned());
     }
@@ -203,7 +207,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
         let (row, column) = (i.max(j), i.min(j));
         triangle[row * (row + 1) / 2 + column]
     });
-    let known = Known {
+    let known = StoredPosterior {
         covariance,
         noise: Noise {
             white_mm: [noise[0], noise[1], noise[2]],
@@ -231,12 +235,12 @@ fn is_covariance(matrix: &DMatrix<f64>) -> bool {
 mod tests {
     use super::*;
 
-    fn known() -> Known {
+    fn known() -> StoredPosterior {
         of_rows(COUNT)
     }
 
-    fn of_rows(rows: usize) -> Known {
-        Known {
+    fn of_rows(rows: usize) -> StoredPosterior {
+        StoredPosterior {
             covariance: DMatrix::from_fn(rows, rows, |i, j| {
                 let size = |k: usize| 1e-6 * (1.0 + k as f64);
                 size(i) * size(j) * if i == j { 1.0 } else { 0.5 }
@@ -255,7 +259,7 @@ mod tests {
         let bytes = encode(&[7; HASH_BYTES], &known());
         assert_eq!(bytes.len(), 26_700);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], known())));
-        let repaired = Known {
+        let repaired = StoredPosterior {
             repaired: vec![
                 "the gain of Hall B changes by 1 µV".to_owned(),
                 "a step".to_owned(),
@@ -264,10 +268,10 @@ mod tests {
         };
         let bytes = encode(&[7; HASH_BYTES], &repaired);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], repaired)));
-        let with_warmth = of_rows(COUNT + 6);
-        let bytes = encode(&[7; HASH_BYTES], &with_warmth);
+        let with_temperature = of_rows(COUNT + 6);
+        let bytes = encode(&[7; HASH_BYTES], &with_temperature);
         assert_eq!(bytes.len(), 26_700 + 4_056);
-        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_warmth)));
+        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_temperature)));
     }
 
     #[test]

@@ -8,8 +8,8 @@ use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::axis::PLANAR;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::frame::MISSING_CODE;
@@ -21,7 +21,7 @@ pub type RowErrors = Vec<Option<[f64; 3]>>;
 /// The errors of a log with the designed values and Model (15), no zero deviation taken off. `None` where these make no
 /// decoder, or decode no row.
 pub fn designed(dataset: &Dataset, stage: &Stage) -> Option<(RowErrors, PoseError)> {
-    let designed = FieldParameters::of_model_31(&Parameters::designed(stage), stage);
+    let designed = FieldParameters::from_model_31(&Parameters::designed(stage), stage);
     let designed = calibration(&dataset.rows, stage, ModelKind::M15, &designed).ok()?;
     let decoded = Decoded::new(&designed.prepare(&Origin::default()).ok()?, dataset);
     let errors = decoded.judge(dataset, stage, Zeros::None).errors;

@@ -2,8 +2,8 @@
 
 use super::errors::pose;
 use super::figure::{Figure, Group, figure, group};
-use hallstage_solver::solve::field::fit::FieldFigures;
-use hallstage_solver::solve::field::posterior::{PoseUncertainty, Posterior};
+use hallstage_solver::estimator::field::FieldFigures;
+use hallstage_solver::estimator::posterior::{PoseUncertainty, Posterior};
 
 /// Pairs and directions that are reported.
 const PAIRS: usize = 10;
@@ -62,7 +62,7 @@ fn predictions(fit: &FieldFigures, posterior: &Posterior) -> Vec<Group> {
         let larger = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k].max(b[k]));
         (larger(a, c), larger(b, d))
     });
-    let service = &fit.verdict.service;
+    let service = &fit.comparison.service;
     let mean = Some((service.systematic, service.noise));
     let places = [
         ("at rest", rest.map(|at| diagonal(&at))),

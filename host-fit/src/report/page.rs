@@ -15,7 +15,7 @@ use hallstage_calibration::judge::statistics::white_noise;
 use hallstage_input::axis::{AXES, Axis, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
+use hallstage_solver::estimator::model::Model;
 use minijinja::Error;
 use runtime::ModelKind;
 
@@ -115,7 +115,7 @@ impl Source<'_> {
                 _ => "movements like those of the log".to_owned(),
             });
             add("valid for", ranges.join(", "));
-            add("model", Model::of(set.model).title());
+            add("model", Model::from_kind(set.model).title());
         }
         add("temperature", self.temperature());
         add(
@@ -163,7 +163,7 @@ impl Source<'_> {
     fn sections(&self, log: &Log, report: &Report) -> [Section; 5] {
         let noise = white_noise(&report.by_row, &self.dataset.movements);
         let before = designed(self.dataset, self.stage);
-        let after = format!("after: {}", Model::of(report.set.model).title());
+        let after = format!("after: {}", Model::from_kind(report.set.model).title());
         let rows = [
             before
                 .as_ref()

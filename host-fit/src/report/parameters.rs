@@ -4,10 +4,10 @@ use super::figure::{Figure, Group, bare, figure, group};
 use super::table::Table;
 use hallstage_input::axis::PROBES;
 use hallstage_input::stage::{Stage, paper_signs};
-use hallstage_solver::problem::model::{COUNT, Model, ParameterId};
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::parameters::values_of;
-use hallstage_solver::solve::field::terms::{self, BEYOND_MODEL_31, PER_PROBE};
+use hallstage_solver::estimator::model::{COUNT, Model, ParameterId};
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::values_of;
+use hallstage_solver::estimator::terms::{self, BEYOND_MODEL_31, PER_PROBE};
 use runtime::{ModelKind, ParameterSet};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -79,8 +79,8 @@ pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
     match values_of(set) {
         Some(values) => field_parameters(&values, None),
         None => parameters(
-            Model::of(set.model),
-            &Parameters::of_set(set),
+            Model::from_kind(set.model),
+            &Parameters::from_set(set),
             &[None; COUNT],
         ),
     }
@@ -191,6 +191,6 @@ fn powers(name: &str) -> String {
 /// The designed values by name, SI.
 pub fn designed(stage: &Stage) -> BTreeMap<String, f64> {
     let values = Parameters::designed(stage).values;
-    let ids = Model::of(ModelKind::M31).parameters();
+    let ids = Model::from_kind(ModelKind::M31).parameters();
     ids.map(|id| (id.name(), values[id.index])).collect()
 }

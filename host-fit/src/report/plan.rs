@@ -8,7 +8,7 @@ use hallstage_calibration::plan::Plan;
 use hallstage_calibration::plan::temperature::WarmLog;
 use hallstage_input::axis::{AXES, PLANAR};
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
+use hallstage_solver::estimator::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
 /// Number of the least determined parameters that are named.

@@ -15,8 +15,8 @@ use hallstage_input::dataset::{Dataset, Movement};
 use hallstage_input::finding::Finding;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::paper::Parameters;
 use runtime::ParameterSet;
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
@@ -154,9 +154,9 @@ impl Report {
         let excerpt = (used < rows).then(|| group! { "rows" => used, "runs" => runs });
         let parameters = parameters_in(set);
         let zero_deviations = zero_deviations(c.dataset, judgement);
-        let places_m = Parameters::of_set(set).nearest_places_m(c.stage);
+        let places_m = Parameters::from_set(set).nearest_places_m(c.stage);
         let mut figures = group! {
-            "model" => Model::of(set.model).name,
+            "model" => Model::from_kind(set.model).name,
             "rows" => rows,
             "judged_rows" => judgement.rows(),
             "train_rows" => set.fit.train_rows,
@@ -216,7 +216,7 @@ impl Report {
             Judged {
                 set: &fit.set,
                 judgement: &fit.judgement,
-                zeros: Zeros::of_model(fit.model),
+                zeros: Zeros::for_model(fit.model),
                 by_row: &by_row,
                 over_rows: fit.judgement.errors,
             },

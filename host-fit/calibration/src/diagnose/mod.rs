@@ -48,8 +48,8 @@ use bank::Fitted;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
 
@@ -94,7 +94,7 @@ pub fn diagnose_log(
         parameters: &own.parameters,
         start: &best.parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
-        for_service: field.is_some_and(|field| !field.verdict.by_resets),
+        for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_to_rows: fitted.is_ok(),
     };
     let mut out = Diagnosis::default();
@@ -148,7 +148,7 @@ struct Described {
 impl Described {
     /// The parameters of a fit, or of the drawing where there is no fit.
     fn by_fit(fitted: Result<&Fit, &FitError>, stage: &Stage) -> Self {
-        let of_31 = |parameters| FieldParameters::of_model_31(parameters, stage);
+        let of_31 = |parameters| FieldParameters::from_model_31(parameters, stage);
         match fitted {
             Ok(fit) => Self {
                 parameters: fit.estimate.parameters,
@@ -300,8 +300,8 @@ pub fn diagnose_blob(
     blob_use: BlobUse,
 ) -> Diagnosis {
     let dataset = &*dataset.compensated(set.constants.temperature.rounded());
-    let of_field = FieldParameters::of_set(set, stage);
-    let of_31 = || FieldParameters::of_model_31(&Parameters::of_set(set), stage);
+    let of_field = FieldParameters::from_set(set, stage);
+    let of_31 = || FieldParameters::from_model_31(&Parameters::from_set(set), stage);
     let is_for_service = of_field.is_some();
     let parameters = &of_field.unwrap_or_else(of_31);
     let by = Fitted {

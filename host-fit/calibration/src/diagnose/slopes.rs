@@ -1,7 +1,7 @@
 //! How an error of each channel shows in the Hall signals.
 
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::probe::Probe;
+use hallstage_solver::estimator::probe::Probe;
 use nalgebra::{Matrix3, Vector3};
 use runtime::capacitive::vertical_per_gap;
 

@@ -14,10 +14,10 @@ use crate::judge::identify::check_motion;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
-use hallstage_solver::solve::field::parameters::FALL_PER_M;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::FALL_PER_M;
+use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
 
@@ -48,7 +48,7 @@ struct Fitted {
 /// moves. Where its parts `disagree`, which a mistake may cause, too, one needs less to be likely, and is a
 /// warning beside that.
 pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Finding> {
-    let planar = Model::of(ModelKind::M30);
+    let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
     let fitted = fitted(dataset, stage.servo_period_s)?;
     let drawing = Drawing::new(stage);

@@ -8,8 +8,8 @@ use crate::judge::verdict::severity;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::posterior::covariance_at;
-use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::estimator::posterior::covariance_at;
+use hallstage_solver::estimator::temperature::Coefficient;
 use nalgebra::DMatrix;
 use runtime::Temperature;
 use runtime::real::Real;
@@ -29,7 +29,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
     let temperature = &fit.calibration.temperature;
     let parameters = fit.estimate.parameters;
     let (error_per_k, spans_k) = match &fit.field {
-        Some(field) => (field.warmth.error_per_k, field.warmth.spans_k),
+        Some(field) => (field.temperature.error_per_k, field.temperature.spans_k),
         // Other models take k and h as the stage file expects them.
         None => {
             let expected = stage
@@ -41,9 +41,9 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
     };
     let floor = white_noise(&fit.decoded.errors, &dataset.movements);
     let cost = |sensor: usize| {
-        let mut covariance = DMatrix::zeros(COUNT + 6, COUNT + 6);
+        let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
         for (probe, errors) in error_per_k.iter().enumerate() {
-            let k = COUNT + 2 * probe + sensor;
+            let k = Coefficient::new(probe, sensor).row();
             covariance[(k, k)] = errors[sensor] * errors[sensor];
         }
         let changes_k = [drift_k(dataset, temperature, sensor); 2];

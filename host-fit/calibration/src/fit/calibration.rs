@@ -2,7 +2,7 @@
 
 use hallstage_input::dataset::Row;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::model::Probes;
 use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind, Temperature};

@@ -1,8 +1,8 @@
 //! Why a fit gives no calibration.
 
 use crate::judge::identify::FitFailure;
+use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::solve::SolveError;
-use hallstage_solver::solve::field::error::FieldFitError;
 use runtime::parameters::ParameterError;
 
 /// Why there is no calibration.

@@ -1,8 +1,8 @@
 //! What a fit, a search or a repair finds: parameters, and how well the log determines them.
 
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::posterior::Posterior;
-use hallstage_solver::solve::field::sandwich::ReferenceLag;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::posterior::Posterior;
+use hallstage_solver::estimator::sandwich::ReferenceLag;
 use runtime::Temperature;
 use std::time::Duration;
 

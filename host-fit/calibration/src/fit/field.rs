@@ -3,12 +3,12 @@
 
 use super::job::{Job, check_near};
 use super::{Estimate, Fit, FitError, FittedRows};
-use hallstage_solver::problem::Problem;
-use hallstage_solver::problem::model::Model;
+use hallstage_solver::estimator::error::FieldFitError;
+use hallstage_solver::estimator::field::WhiteFit;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::problem::Problem;
+use hallstage_solver::estimator::robust::{self, Loss};
 use hallstage_solver::solve::Solver;
-use hallstage_solver::solve::field::error::FieldFitError;
-use hallstage_solver::solve::field::fit::WhiteFit;
-use hallstage_solver::solve::robust::{self, Loss};
 use runtime::ModelKind;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -27,7 +27,7 @@ impl Job<'_> {
         let fitted = || {
             let started = Instant::now();
             let (rows, settings) = (&self.selected, self.settings);
-            let model = Model::of(ModelKind::M31);
+            let model = Model::from_kind(ModelKind::M31);
             let problem = Problem::new(self.dataset, rows, self.stage, model);
             let least_squares = Solver::LeastSquares.solve(&problem, &settings.options);
             let found = least_squares.map_err(FitError::from).and_then(|start| {
@@ -62,19 +62,19 @@ impl Job<'_> {
         let started = Instant::now();
         let first = self.first_phase()?;
         let found = first.field.clone().finish(self.stage)?;
-        let verdict = found.figures.verdict;
-        if verdict.loses() {
-            return Err(FieldFitError::NotCarried(Box::new(verdict)).into());
+        let comparison = found.figures.comparison;
+        if comparison.loses() {
+            return Err(FieldFitError::NotCarried(Box::new(comparison)).into());
         }
         check_near(
             self.stage,
-            Model::of(ModelKind::M31),
+            Model::from_kind(ModelKind::M31),
             &found.parameters.model_31(),
         )?;
         let estimate = Estimate {
             lag: found.lag,
             parameters: found.parameters,
-            temperature: found.figures.warmth.temperature,
+            temperature: found.figures.temperature.temperature,
             posterior: found.posterior,
             // The fit follows the reference's walk.
             delta_m: None,
@@ -93,7 +93,7 @@ impl Job<'_> {
         let fit = self.judged(model, estimate, fitted)?;
         self.check_described(&fit)?;
         Ok(Fit {
-            model_reason: verdict.to_string(),
+            model_reason: comparison.to_string(),
             field: Some(found.figures),
             ..fit
         })

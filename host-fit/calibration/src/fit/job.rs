@@ -6,15 +6,15 @@ use super::{Estimate, Fit, FitError, FitSettings, FittedRows, ModelChoice};
 use crate::judge::identify::{check_described, check_determined, check_motion};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::Problem;
-use hallstage_solver::problem::draw::draw_rows;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::{Parameters, SLOPES, search_box};
-use hallstage_solver::solve::field::blocks::Rows;
-use hallstage_solver::solve::field::error::FieldFitError;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::sandwich::Sandwich;
-use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::estimator::draw::draw_rows;
+use hallstage_solver::estimator::error::FieldFitError;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::paper::{Parameters, SLOPES, search_box};
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::problem::Problem;
+use hallstage_solver::estimator::robust::Loss;
+use hallstage_solver::estimator::rows::Rows;
+use hallstage_solver::estimator::sandwich::Sandwich;
 use hallstage_solver::solve::{Projection, Solver};
 use runtime::ModelKind;
 use std::cell::OnceCell;
@@ -66,8 +66,13 @@ impl<'a> Job<'a> {
             Solver::Finished | Solver::LeastSquares
         ) && self.settings.options.projection == Projection::Linear;
         let reason = if usual {
-            match self.fit_model(Model::of(ModelKind::Field)) {
-                Ok(fit) if fit.field.as_ref().is_some_and(|field| field.verdict.field) => {
+            match self.fit_model(Model::from_kind(ModelKind::Field)) {
+                Ok(fit)
+                    if fit
+                        .field
+                        .as_ref()
+                        .is_some_and(|field| field.comparison.field) =>
+                {
                     return Ok(fit);
                 }
                 Ok(fit) => fit.model_reason,
@@ -76,7 +81,7 @@ impl<'a> Job<'a> {
         } else {
             "--solver and --project choose how models of the paper are fitted; the field model has a way of its own".to_owned()
         };
-        let mut fit = self.fit_model(Model::of(ModelKind::M31))?;
+        let mut fit = self.fit_model(Model::from_kind(ModelKind::M31))?;
         fit.model_reason = format!("model (31): {reason}");
         Ok(fit)
     }
@@ -169,7 +174,7 @@ impl<'a> Job<'a> {
         };
         let estimate = Estimate {
             lag,
-            parameters: FieldParameters::of_model_31(&parameters, stage),
+            parameters: FieldParameters::from_model_31(&parameters, stage),
             temperature: dataset.temperature,
             posterior: sandwich.posterior,
             delta_m: Some(solution.delta_m),

@@ -5,7 +5,7 @@ use super::job::fit_once;
 use super::{Fit, FitError, FitSettings, ModelChoice, warning};
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
+use hallstage_solver::estimator::model::Model;
 use runtime::ModelKind;
 
 /// Rounds of fit and interpolation. After the first, a hundredth of a lag of several rows remains.
@@ -28,7 +28,7 @@ pub(super) fn without_lag(
     let found = match (fit_once(dataset, stage, settings), settings.model) {
         // A lag of many rows is more than the field model can follow: Model (31) finds it.
         (Err(FitError::Field(error)), ModelChoice::Named(_)) => {
-            let model = ModelChoice::Named(Model::of(ModelKind::M31));
+            let model = ModelChoice::Named(Model::from_kind(ModelKind::M31));
             let of_31 = FitSettings {
                 model,
                 ..settings.clone()

@@ -8,8 +8,8 @@ use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet, VerticalPose};
 
 const SEED: u64 = 2;
@@ -32,12 +32,12 @@ fn ratio_in_service(stage: &Stage) -> f64 {
     let run = Protocol::Combined.run(stage.servo_period_s, SEED);
     let log = record(stage, &assembly, run, &SensorErrors::USUAL, SEED).expect("clear");
     let dataset = log.dataset(stage).expect("a triangle");
-    let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::Field)));
+    let settings = FitSettings::new(ModelChoice::Named(Model::from_kind(ModelKind::Field)));
     let fit = fit(&dataset, stage, &settings).expect("a fit");
     let mut buffer = [0; runtime::blob::MAX_BYTES];
     let blob = fit.set.to_bytes(&mut buffer).expect("room");
     let set = ParameterSet::from_bytes(blob).expect("a sound blob");
-    let parameters = FieldParameters::of_set(&set, stage).expect("a field model");
+    let parameters = FieldParameters::from_set(&set, stage).expect("a field model");
     let constants = parameters.constants(1.0).expect("regular");
     let (mut squares, mut count) = ([0.0; 3], 0.0);
     let service = Protocol::Service.run(stage.servo_period_s, SEED);

@@ -4,7 +4,7 @@ use super::{Estimate, Fit, FitError};
 use crate::judge::predicted::Predicted;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use nalgebra::DMatrix;
 
 /// Parameters that were estimated together with the faults of a log. They describe the stage at the end of the log.

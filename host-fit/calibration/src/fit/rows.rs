@@ -2,7 +2,7 @@
 
 use crate::judge::left_out::{LeftOut, RowPlace};
 use hallstage_input::dataset::{Dataset, Row};
-use hallstage_solver::solve::robust::{HALF, Loss};
+use hallstage_solver::estimator::robust::{HALF, Loss};
 
 /// The rows of a dataset that a fit uses.
 #[derive(Clone, Debug)]

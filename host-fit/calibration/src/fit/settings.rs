@@ -1,8 +1,8 @@
 //! What the user of a fit chooses.
 
-use hallstage_solver::problem::draw::Draw;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::estimator::draw::Draw;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::parameters::Text;
 

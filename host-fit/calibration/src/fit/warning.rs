@@ -7,10 +7,10 @@ use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::terms::shown;
-use hallstage_solver::problem::zero_deviation::ZeroDeviation;
-use hallstage_solver::solve::field::least_squares::at_limit;
-use hallstage_solver::solve::field::sandwich::ReferenceLag;
+use hallstage_solver::estimator::least_squares::at_limit;
+use hallstage_solver::estimator::motion::shown;
+use hallstage_solver::estimator::sandwich::ReferenceLag;
+use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 
 /// Warn of a lag from this part of a servo period on, ...
 const LAG_MIN: f64 = 0.1;

@@ -4,10 +4,10 @@ use crate::judge::statistics::PoseError;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
-use hallstage_solver::problem::model::{GAIN_TERMS, Model, ParameterId};
-use hallstage_solver::problem::parameters::{Parameters, THETA, search_box};
-use hallstage_solver::problem::terms::Motion;
-use hallstage_solver::solve::field::sandwich::Sandwich;
+use hallstage_solver::estimator::model::{GAIN_TERMS, Model, ParameterId};
+use hallstage_solver::estimator::motion::Motion;
+use hallstage_solver::estimator::paper::{Parameters, THETA, search_box};
+use hallstage_solver::estimator::sandwich::Sandwich;
 use nalgebra::Vector3;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a

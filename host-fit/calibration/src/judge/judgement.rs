@@ -4,8 +4,8 @@ use super::Zeros;
 use super::statistics::{ErrorSums, PoseError};
 use hallstage_input::dataset::{Movement, Row};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::problem::zero_deviation::ZeroDeviation;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 use runtime::parameters::FitRecord;
 
 /// The figures of one parameter set on the rows of one or more logs.
@@ -125,7 +125,11 @@ impl<'s> Judge<'s> {
             let zero = match zeros {
                 Zeros::None => ZeroDeviation::NONE,
                 Zeros::Refit => of.sums.mean().map_or(ZeroDeviation::NONE, |mean| {
-                    ZeroDeviation::of_mean_error(&self.parameters, mean, &self.stage.search.delta_m)
+                    ZeroDeviation::from_mean_error(
+                        &self.parameters,
+                        mean,
+                        &self.stage.search.delta_m,
+                    )
                 }),
                 Zeros::Given(deltas) => deltas.get(number).map_or(ZeroDeviation::NONE, |&delta| {
                     ZeroDeviation::given(&self.parameters, delta)

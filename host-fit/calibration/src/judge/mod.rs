@@ -30,9 +30,9 @@ pub use judgement::{Judge, Judgement, LogJudgement};
 
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::problem::zero_deviation::ZeroDeviation;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::{AnyDecoder, ParameterSet, PlanarPose};
 use statistics::ErrorSums;
@@ -50,7 +50,7 @@ pub enum Zeros<'z> {
 
 impl Zeros<'_> {
     /// Refitted for a model with zero deviations, else none.
-    pub const fn of_model(model: &Model) -> Self {
+    pub const fn for_model(model: &Model) -> Self {
         if model.has_zero_deviation {
             Self::Refit
         } else {
@@ -92,7 +92,7 @@ impl Decoded {
         let decoder = set.decoder();
         let one = |row: &Row| error(&decoder, row);
         Self {
-            parameters: Parameters::of_set(set),
+            parameters: Parameters::from_set(set),
             errors: dataset.rows.par_iter().map(one).collect(),
         }
     }

@@ -2,10 +2,11 @@
 
 use super::verdict::GOOD_MAX;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::carry::{Service, service_poses};
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::posterior::covariance_at;
-use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::posterior::covariance_at;
+use hallstage_solver::estimator::service::{Service, service_poses};
+use hallstage_solver::estimator::temperature::Coefficient;
+use hallstage_solver::estimator::terms::COUNT;
 use nalgebra::DMatrix;
 use runtime::Temperature;
 use serde::ser::SerializeMap;
@@ -80,7 +81,7 @@ pub struct Validity {
 
 impl Validity {
     /// For parameters with this covariance, as
-    /// [`Posterior::covariance`](hallstage_solver::solve::field::posterior::Posterior::covariance), and probes with
+    /// [`Posterior::covariance`](hallstage_solver::estimator::posterior::Posterior::covariance), and probes with
     /// this white noise, mm; `None` where the probes do not determine the pose.
     pub fn new(
         stage: &Stage,
@@ -93,14 +94,15 @@ impl Validity {
         let [k, h] = stage.temperature.prior_per_k;
         let mut covariance = covariance.clone();
         if !is_followed {
-            covariance.resize_mut(COUNT + 6, COUNT + 6, 0.0);
-            for (place, [_, deviation]) in (COUNT..).zip([k, h, k, h, k, h]) {
-                covariance[(place, place)] = deviation * deviation;
+            covariance.resize_mut(Coefficient::ROWS, Coefficient::ROWS, 0.0);
+            for of in Coefficient::ALL {
+                let [_, deviation] = stage.temperature.prior_per_k[of.sensor];
+                covariance[(of.row(), of.row())] = deviation * deviation;
             }
         }
         let off_per_k = if is_followed { 0.0 } else { k[0] + h[0] };
         let is_good = |change_k: f64| {
-            let off = parameters.by_gain([off_per_k * change_k; 3]);
+            let off = parameters.gain_change([off_per_k * change_k; 3]);
             let covariance = covariance_at(&covariance, parameters, [change_k; 2]);
             Predicted::new(service, &covariance, &off).worst_ratio() <= GOOD_MAX
         };
@@ -174,18 +176,18 @@ impl Serialize for Predicted {
 mod tests {
     use super::*;
     use hallstage_input::shipped::STAGE_TOML;
-    use hallstage_solver::problem::parameters::Parameters;
+    use hallstage_solver::estimator::paper::Parameters;
 
-    /// Known exactly but for k, a stage is good while the error of k allows.
+    /// StoredPosterior exactly but for k, a stage is good while the error of k allows.
     #[test]
     fn a_calibration_is_good_while_k_is_known_well_enough() {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
         let white_mm = [5e-4; 3];
-        let parameters = FieldParameters::of_model_31(&Parameters::designed(&stage), &stage);
+        let parameters = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
         let within = |error_per_k: f64| {
-            let mut covariance = DMatrix::zeros(COUNT + 6, COUNT + 6);
+            let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
             (0..3).for_each(|probe| {
-                let k = COUNT + 2 * probe;
+                let k = Coefficient::new(probe, 0).row();
                 covariance[(k, k)] = error_per_k * error_per_k;
             });
             let found = Validity::new(&stage, &parameters, white_mm, &covariance);
@@ -200,7 +202,7 @@ mod tests {
         for probe in 0..3 {
             let mut parts = [0.0; 3];
             parts[probe] = 3e-4 * rough;
-            let by = DMatrix::from_column_slice(COUNT, 1, &parameters.by_gain(parts));
+            let by = DMatrix::from_column_slice(COUNT, 1, &parameters.gain_change(parts));
             covariance += &by * by.transpose();
         }
         let ratio = Predicted::new(&service, &covariance, &[0.0; COUNT]).worst_ratio();

@@ -3,11 +3,11 @@
 use super::run::PlannedRun;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::problem::parameters::Parameters;
-use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
-use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
-use hallstage_solver::solve::field::parameters::{FALL_PER_M, FieldParameters};
-use hallstage_solver::solve::field::whiten::Noise;
+use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
+use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::parameters::{FALL_PER_M, FieldParameters};
+use hallstage_solver::estimator::rows::{FieldRow, Rows};
+use hallstage_solver::estimator::whiten::Noise;
 use runtime::model::Sensitivity;
 
 /// The stage before its calibration: probes at their designed places over the centre lines of the
@@ -28,7 +28,7 @@ fn designed(stage: &Stage) -> FieldParameters {
             per_ry_rad: -a * x,
         }
     });
-    FieldParameters::of_model_31(&Parameters::of_model_31(&geometry, &sensitivity), stage)
+    FieldParameters::from_model_31(&Parameters::from_model_31(&geometry, &sensitivity), stage)
 }
 
 /// The forecaster for a stage before its calibration: as designed, with the noise of the given logs.
@@ -63,7 +63,7 @@ pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
             let time_s = (k as f64 + 0.5) * step_s;
             let at: [[f64; 3]; 6] = std::array::from_fn(|axis| run.axis_at(axis, time_s));
             FieldRow {
-                warmth_k: [*change_k; 3],
+                temperature_k: [*change_k; 3],
                 weight: 1.0,
                 time_s,
                 signal_mm: [0.0; 3],
@@ -75,5 +75,5 @@ pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
         rows.extend((0..(run.seconds / step_s).floor() as usize).map(row));
         movements.push(start..rows.len());
     }
-    Rows::of_movements(rows, movements)
+    Rows::from_movements(rows, movements)
 }

@@ -26,7 +26,7 @@ mod tests;
 use forecast::{forecast, forecaster};
 use hallstage_input::axis::AXES;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
+use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
 use run::PlannedRun;
 
 /// Largest predicted error in service over the noise floor of an accepted run: the sensors, not the run,

@@ -8,7 +8,7 @@ use super::forecast::forecast;
 use super::run::PlannedRun;
 use hallstage_input::stage::{AxisMotion, Stage};
 use hallstage_simulate::random::{Purpose, Stream};
-use hallstage_solver::solve::field::forecast::Forecaster;
+use hallstage_solver::estimator::forecast::Forecaster;
 use rayon::prelude::*;
 
 /// Highest frequency, Hz. Faster motion shakes the stage and gains nothing, since the reference hardly

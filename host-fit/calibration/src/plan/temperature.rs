@@ -6,7 +6,7 @@
 use super::forecast::{forecaster, rows};
 use super::{PlanError, plan};
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::warmth::Sensors;
+use hallstage_solver::estimator::temperature::Sensors;
 
 /// Usual length of the cold run, s.
 pub const COLD_S: f64 = 30.0;
@@ -84,7 +84,7 @@ pub fn protocol(stage: &Stage, seconds: f64) -> Result<Vec<WarmLog>, PlanError> 
         let at = DISTANCES_K.map(|distance| [0, 1].map(|k| distance - zero[k]));
         let weight = step_s / stage.servo_period_s;
         let rows = rows(&runs, step_s);
-        let expected = forecaster.forecast_warm(&rows, weight, &sensors, &at);
+        let expected = forecaster.forecast_temperatures(&rows, weight, &sensors, &at);
         let expected = expected.ok_or(PlanError::NoPose)?;
         let errors = expected.error_per_k;
         let worst = |k: usize| errors.iter().map(|error| error[k]).fold(0.0, f64::max);

@@ -9,9 +9,9 @@ use hallstage_simulate::pose::StagePose;
 use hallstage_simulate::protocol;
 use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::problem::Problem;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::fit::{FieldFit, fit_field};
+use hallstage_solver::estimator::field::{FieldFit, fit_field};
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::problem::Problem;
 use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, VerticalPose};
 use std::sync::LazyLock;
@@ -173,7 +173,7 @@ fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
 
 fn fitted(dataset: &Dataset) -> FieldFit {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(dataset, &all, &STAGE, Model::of(ModelKind::M31));
+    let problem = Problem::new(dataset, &all, &STAGE, Model::from_kind(ModelKind::M31));
     let options = SolverOptions::new(Projection::Linear, 1);
     let start = Solver::LeastSquares
         .solve(&problem, &options)
@@ -205,7 +205,7 @@ fn the_forecast_is_what_fits_to_simulated_logs_give() {
         };
         let trajectory = PLAN.run.trajectory(STAGE.servo_period_s);
         let fit = fitted(&recorded(trajectory, &SensorErrors::USUAL));
-        let own = &fit.figures.verdict.service;
+        let own = &fit.figures.comparison.service;
         for axis in 0..3 {
             let ratio = (own.systematic[axis] / own.noise[axis])
                 / (forecast.systematic[axis] / forecast.noise[axis]);

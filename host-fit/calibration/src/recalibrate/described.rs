@@ -1,7 +1,7 @@
 //! Does the change explain the log of a recalibration?
 
-use super::{Known, OPEN_MAX_ALL, RecalibrateError};
-use hallstage_solver::solve::field::update::{Change, Update};
+use super::{OPEN_MAX_ALL, RecalibrateError, StoredPosterior};
+use hallstage_solver::estimator::update::{Change, Update};
 
 /// Chi-square may be this part larger than for the old log, since the model is not exact.
 const MISFIT_MAX: f64 = 0.02;
@@ -14,7 +14,7 @@ const FAR_MAX: f64 = 4.0;
 /// explains.
 pub(super) fn check_described(
     update: &Update,
-    known: Option<&Known>,
+    known: Option<&StoredPosterior>,
     change: Change,
 ) -> Result<(), RecalibrateError> {
     let count = update.residuals.max(1) as f64;

@@ -1,7 +1,7 @@
 //! On a stage made of physics: how far off it is in service after a change, and after what
 //! recalibration makes of a few seconds.
 
-use super::{Change, Known, RecalibrateError, Recalibration, recalibrate};
+use super::{Change, RecalibrateError, Recalibration, StoredPosterior, recalibrate};
 use crate::fit::{FitSettings, ModelChoice, fit};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped::STAGE_TOML;
@@ -12,8 +12,8 @@ use hallstage_simulate::probe::TrimmedProbe;
 use hallstage_simulate::protocol::{Protocol, Run, Trajectory};
 use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use nalgebra::Vector3;
 use runtime::parameters::Text;
 use runtime::{ModelKind, ParameterSet, VerticalPose};
@@ -49,7 +49,7 @@ struct Old {
     stage: Stage,
     assembly: Assembly,
     set: ParameterSet,
-    known: Known,
+    known: StoredPosterior,
 }
 
 impl Old {
@@ -57,11 +57,11 @@ impl Old {
     fn new() -> Self {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
         let assembly = Assembly::draw(&stage, SEED);
-        let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::Field)));
+        let settings = FitSettings::new(ModelChoice::Named(Model::from_kind(ModelKind::Field)));
         let dataset = log(&stage, &assembly, sines(8.0, RUN), SEED);
         let fit = fit(&dataset, &stage, &settings).expect("a fit");
         Self {
-            known: Known::from_fit(&fit).expect("of the field model"),
+            known: StoredPosterior::from_fit(&fit).expect("of the field model"),
             set: fit.set,
             stage,
             assembly,
@@ -91,7 +91,7 @@ impl Old {
     fn ratios(&self, now: &Assembly, new: &Recalibration) -> [f64; 2] {
         let service = Protocol::Service.run(0.002, SEED);
         [&self.set, &new.set].map(|set| {
-            let parameters = FieldParameters::of_set(set, &self.stage).expect("a field model");
+            let parameters = FieldParameters::from_set(set, &self.stage).expect("a field model");
             let constants = parameters.constants(1.0).expect("sound");
             let mut squares = [0.0; 3];
             let mut count = 0.0;

@@ -33,7 +33,7 @@ pub enum Kind {
 
 /// All that is known of the columns that hold a quantity.
 #[derive(Debug)]
-struct Known {
+struct StoredPosterior {
     /// Key in the table `[log]` of `stage.toml`.
     key: &'static str,
     /// Its column in a log, unless `[log]` names another.
@@ -61,7 +61,7 @@ macro_rules! quantities {
             pub const ALL: [Self; [$($key),*].len()] = [$(Self::$name),*];
         }
 
-        static KNOWN: [Known; Quantity::ALL.len()] = [$(Known {
+        static KNOWN: [StoredPosterior; Quantity::ALL.len()] = [$(StoredPosterior {
             key: $key,
             default_column: $column,
             kind: Kind::$kind,
@@ -110,7 +110,7 @@ impl Quantity {
     /// The reference pose in SI units.
     pub const PLANAR: [Self; 3] = [Self::X, Self::Y, Self::Rz];
 
-    fn known(self) -> &'static Known {
+    fn known(self) -> &'static StoredPosterior {
         &KNOWN[self as usize]
     }
 

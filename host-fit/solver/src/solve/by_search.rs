@@ -4,13 +4,13 @@
 //! from each movement, until it hardly improves. The least-squares fit on all rows then starts from its best
 //! individual. The result is the least-squares optimum for every seed; the search guards against a bad start.
 
-use super::field::least_squares;
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
 use super::{Projection, Solution, SolveError, SolverOptions};
-use crate::problem::Problem;
-use crate::problem::parameters::Parameters;
+use crate::estimator::least_squares;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
 
 /// Rows for a search that a least-squares fit finishes.
 const FEW_ROWS: usize = 400;

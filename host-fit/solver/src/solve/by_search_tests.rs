@@ -1,6 +1,6 @@
 use super::*;
+use crate::estimator::least_squares::at_limit;
 use crate::solve::Solver;
-use crate::solve::field::least_squares::at_limit;
 use crate::solve::objective::sample_for_tests::{dataset, problem, stage};
 use runtime::ModelKind;
 

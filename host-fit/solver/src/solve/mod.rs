@@ -2,11 +2,8 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`gauss_newton`] | the estimator: damped Gauss-Newton with a prior |
-//! | [`field`] | the models by it |
 //! | [`objective`] | the fitness as a cost function of a search |
 //! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
-//! | [`robust`] | rows that the model does not explain count less |
 //! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 //!
 //! ```
@@ -17,11 +14,11 @@
 //! # use hallstage_input::shipped::LOG_GZ;
 //! # let reading = log::read_bytes(LOG_GZ, "paper.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! # use hallstage_solver::problem::Problem;
-//! # use hallstage_solver::problem::draw::{Draw, draw_rows};
-//! # use hallstage_solver::problem::model::Model;
+//! # use hallstage_solver::estimator::problem::Problem;
+//! # use hallstage_solver::estimator::draw::{Draw, draw_rows};
+//! # use hallstage_solver::estimator::model::Model;
 //! # let rows = draw_rows(&dataset, 200, Draw::Stratified, 1);
-//! # let problem = Problem::new(&dataset, &rows, &stage, Model::of(runtime::ModelKind::M31));
+//! # let problem = Problem::new(&dataset, &rows, &stage, Model::from_kind(runtime::ModelKind::M31));
 //! use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 //!
 //! let options = SolverOptions::new(Projection::Linear, 1);
@@ -31,14 +28,12 @@
 //! ```
 
 pub mod by_search;
-pub mod field;
-pub mod gauss_newton;
 pub mod objective;
-pub mod robust;
 pub mod search;
 
-use crate::problem::Problem;
-use crate::problem::parameters::Parameters;
+use crate::estimator::least_squares;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
 use hallstage_input::watch::Watch;
 use search::kind::SearchKind;
 use search::run::Checkpoint;
@@ -112,7 +107,7 @@ impl Solver {
         let started = Instant::now();
         let mut solution = match self {
             Self::Finished => by_search::solve_finished(problem, options)?,
-            Self::LeastSquares => field::least_squares::solve(problem, options.known.as_slice())?,
+            Self::LeastSquares => least_squares::solve(problem, options.known.as_slice())?,
             Self::Search(kind) => by_search::solve(kind, problem, options)?,
         };
         solution.elapsed = started.elapsed();

@@ -14,7 +14,7 @@ use super::node_clock::{Run, Tick};
 use super::reference::{Reference, Sample};
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::clocks::{Alignment, Lag};
+use hallstage_solver::estimator::clocks::{Alignment, Lag};
 use nalgebra::Matrix3;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::Row;

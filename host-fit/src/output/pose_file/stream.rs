@@ -5,7 +5,7 @@ use crate::output::{Output, OutputError};
 use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions};
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
-use hallstage_solver::solve::field::posterior::Posterior;
+use hallstage_solver::estimator::posterior::Posterior;
 use runtime::{AnyDecoder, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! The standard uncertainty of each pose of a pose file.
 
-use hallstage_solver::solve::field::posterior::Posterior;
+use hallstage_solver::estimator::posterior::Posterior;
 use runtime::Reading;
 
 /// Standard uncertainties of X, Y, Rz of a reading, m, m, rad: by the parameters and by the noise of

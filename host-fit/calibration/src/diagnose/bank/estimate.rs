@@ -3,12 +3,12 @@
 
 use super::means::Log;
 use super::{FAULTS_MAX, ROUNDS};
-use hallstage_solver::solve::field::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
-use hallstage_solver::solve::field::parameters::{FieldParameters, HELD, unknowns};
-use hallstage_solver::solve::field::probe::probes;
-use hallstage_solver::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
-use hallstage_solver::solve::field::whiten::{FieldEquations, Gain, Noise, UNKNOWNS};
-use hallstage_solver::solve::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
+use hallstage_solver::estimator::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
+use hallstage_solver::estimator::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
+use hallstage_solver::estimator::parameters::{FieldParameters, HELD, unknowns};
+use hallstage_solver::estimator::probe::probes;
+use hallstage_solver::estimator::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
+use hallstage_solver::estimator::whiten::{FieldEquations, Gain, Noise, UNKNOWNS};
 use nalgebra::{DMatrix, DVector};
 
 /// Columns: the unknowns of the fit, the sizes of the faults, and the residual in the last one; a multiple of
@@ -17,7 +17,7 @@ pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
 pub(super) const RESIDUAL: usize = WIDTH - 1;
 
 /// The priors are so much wider than what magnets and a workshop give: see
-/// [`TERMS`](hallstage_solver::solve::field::terms::TERMS).
+/// [`TERMS`](hallstage_solver::estimator::terms::TERMS).
 const USUAL_PART: f64 = 0.5;
 /// E in parts of its prior, over the part that the terms even in u have of theirs: by 60 simulated stages.
 const CARRY_PART: f64 = 0.4;

@@ -6,9 +6,9 @@ use crate::diagnose::signals::CLEAR;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
-use hallstage_solver::solve::field::blocks::Rows;
-use hallstage_solver::solve::field::probe::Probe;
-use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::estimator::probe::Probe;
+use hallstage_solver::estimator::rows::Rows;
+use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::statistics::white_noise;
 use std::ops::Range;
 

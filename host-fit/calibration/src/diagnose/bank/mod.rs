@@ -29,12 +29,12 @@ use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Quantity, Severity};
 use hallstage_input::stage::Stage;
-use hallstage_solver::problem::model::Model;
-use hallstage_solver::solve::field::carry::Service;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::probe::probes;
-use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE};
-use hallstage_solver::solve::gauss_newton::Factor;
+use hallstage_solver::estimator::gauss_newton::Factor;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::probe::probes;
+use hallstage_solver::estimator::service::Service;
+use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
 use means::Log;
 use nalgebra::DMatrix;
 use runtime::ModelKind;
@@ -215,7 +215,7 @@ impl Job<'_> {
     fn bent(&self, estimate: &Estimate) -> Option<Factor> {
         estimate.without_faults(match self.fitted.model {
             ModelKind::Field => PER_PROBE,
-            model => Model::of(model).fitted,
+            model => Model::from_kind(model).fitted,
         })
     }
 

@@ -11,7 +11,7 @@ use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::problem::model::Model;
+use hallstage_solver::estimator::model::Model;
 use runtime::ModelKind;
 
 /// A log of a stage by a protocol.
@@ -53,7 +53,7 @@ fn what_is_predicted_for_model_31_holds_in_service() {
         (3, Protocol::Paper),
         (4, Protocol::Paper),
     ] {
-        let choice = ModelChoice::Named(Model::of(ModelKind::M31));
+        let choice = ModelChoice::Named(Model::from_kind(ModelKind::M31));
         let (_, diagnosis, rms) = in_service(&stage, seed, protocol, choice);
         assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
         let range = diagnosis.predicted.expect("figures").range;

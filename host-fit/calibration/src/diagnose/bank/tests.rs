@@ -18,8 +18,8 @@ use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::random::{Purpose, Stream};
 use hallstage_simulate::recording::{Recording, Sample, record};
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::probe::probes;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::probe::probes;
 
 pub(super) fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")

@@ -28,7 +28,7 @@ use channels::LogSignals;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::Finding;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::estimator::parameters::FieldParameters;
 use residual::Residuals;
 
 /// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.

@@ -2,9 +2,9 @@
 
 use super::channels::{LogSignals, median};
 use crate::diagnose::slopes::Slopes;
-use hallstage_solver::solve::field::blocks::Rows;
-use hallstage_solver::solve::field::parameters::FieldParameters;
-use hallstage_solver::solve::field::probe::probes;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::probe::probes;
+use hallstage_solver::estimator::rows::Rows;
 use hallstage_solver::statistics::{robust_deviation, white_noise};
 use nalgebra::Vector3;
 

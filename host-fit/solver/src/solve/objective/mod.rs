@@ -28,11 +28,11 @@ pub(crate) mod sample_for_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::problem::Problem;
-use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, search_box};
+use crate::estimator::least_squares::zero_deviations;
+use crate::estimator::linear::{Point, parameters_of, point_of};
+use crate::estimator::paper::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, search_box};
+use crate::estimator::problem::Problem;
 use crate::solve::Projection;
-use crate::solve::field::least_squares::zero_deviations;
-use crate::solve::field::linear::{Point, parameters_of, point_of};
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use hallstage_input::stage::{Range, paper_signs};
@@ -225,9 +225,9 @@ impl<'a> Objective<'a> {
         let point = point_of(&parameters)?;
         if self.projection == Projection::None {
             let delta_m = |movement| self.delta_m_of(individual, movement);
-            return Some(rows::with_delta(problem, &point, delta_m));
+            return Some(rows::squares_at_delta(problem, &point, delta_m));
         }
-        rows::with_best_delta(problem, &point, &parameters)
+        rows::squares_at_best_delta(problem, &point, &parameters)
     }
 }
 

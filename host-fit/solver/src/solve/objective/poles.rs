@@ -8,7 +8,7 @@
 //! is NaN; and the range of each slope is cut where it alone would break that rule. The form
 //! `none` is the paper's and has neither.
 
-use crate::solve::field::blocks::FieldRow;
+use crate::estimator::rows::FieldRow;
 use hallstage_input::stage::Range;
 
 /// Smallest phi / eta of any row: at a twentieth, noise is already twenty times larger.

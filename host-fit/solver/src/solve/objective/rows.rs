@@ -5,10 +5,10 @@
 //! G (s' - delta) with G = PM^-1 diag(1/eta) and s' = s / (phi / eta).
 
 use super::poles::SHARE_MIN;
-use crate::problem::Problem;
-use crate::problem::parameters::Parameters;
-use crate::solve::field::blocks::FieldRow;
-use crate::solve::field::linear::Point;
+use crate::estimator::linear::Point;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
+use crate::estimator::rows::FieldRow;
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::{from_rows, inverse};
 
@@ -33,7 +33,7 @@ impl Ratios {
 }
 
 /// At the given zero deviation of each movement, m.
-pub fn with_delta(
+pub fn squares_at_delta(
     problem: &Problem<'_>,
     point: &Point,
     delta_m: impl Fn(usize) -> [f64; 3],
@@ -53,7 +53,7 @@ pub fn with_delta(
 
 /// At the best zero deviation of each movement: it takes off the movement's mean pose error,
 /// delta = eta (PM mean error), clipped to its range.
-pub fn with_best_delta(
+pub fn squares_at_best_delta(
     problem: &Problem<'_>,
     point: &Point,
     parameters: &Parameters,

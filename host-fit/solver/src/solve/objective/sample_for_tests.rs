@@ -1,10 +1,10 @@
 //! A small log for tests of the objective: Model (31) with noise of a known seed.
 
-use crate::problem::Problem;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::problem::synthetic::Protocol;
-use crate::solve::field::blocks::FieldRow;
+use crate::estimator::model::Model;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
+use crate::estimator::rows::FieldRow;
+use crate::estimator::synthetic::Protocol;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped;
 use hallstage_input::stage::{Range, Stage};
@@ -37,7 +37,7 @@ pub fn truth() -> Parameters {
         lever_arm_m: [0.2, -0.205, -0.35],
         misalignment_rad: [0.01, -0.02, 0.015],
     };
-    Parameters::of_model_31(
+    Parameters::from_model_31(
         &geometry,
         &[
             probe(0.87, -190.0, -70.0, 15.0),
@@ -74,7 +74,7 @@ pub fn dataset(movements: usize, rows: usize) -> Dataset {
 /// The problem of all rows of a sample.
 pub fn problem<'a>(dataset: &Dataset, stage: &'a Stage, model: ModelKind) -> Problem<'a> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    Problem::new(dataset, &all, stage, Model::of(model))
+    Problem::new(dataset, &all, stage, Model::from_kind(model))
 }
 
 /// The sensitivities of the probes in a row.

@@ -5,12 +5,12 @@ use super::poles::SHARE_MIN;
 use super::sample_for_tests::{
     dataset, fitness_by_the_runtime, phi, pose_by_the_runtime, problem, stage, truth,
 };
-use crate::problem::Problem;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::problem::zero_deviation::ZeroDeviation;
+use crate::estimator::model::Model;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
+use crate::estimator::rows::FieldRow;
+use crate::estimator::zero_deviation::ZeroDeviation;
 use crate::solve::Projection;
-use crate::solve::field::blocks::FieldRow;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use hallstage_input::stage::Range;
@@ -57,7 +57,7 @@ fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDe
         }
         let range = &problem.stage.search.delta_m;
         // A search holds them within their range.
-        let mut zero = ZeroDeviation::of_mean_error(parameters, mean, range);
+        let mut zero = ZeroDeviation::from_mean_error(parameters, mean, range);
         zero.delta_m = zero.delta_m.map(|delta| range.clip(delta));
         zeros[number] = zero;
     }
@@ -117,7 +117,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
             let mix = |(near, far): (&f64, &f64)| near + share * (far - near);
             let individual: Vec<f64> = near.iter().zip(&far).map(mix).collect();
             let parameters = cost.parameters(&individual).expect("parameters");
-            let zeros = if Model::of(model).has_zero_deviation {
+            let zeros = if Model::from_kind(model).has_zero_deviation {
                 zero_deviations(&problem, &parameters)
             } else {
                 vec![ZeroDeviation::NONE; problem.rows.movements_of_log]
@@ -210,7 +210,7 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
     );
     assert_eq!((last.low, last.high), (0.0, -0.95 / lowest));
     let no_ratios = Problem {
-        model: Model::of(ModelKind::M30),
+        model: Model::from_kind(ModelKind::M30),
         ..problem.clone()
     };
     assert!(Objective::new(&no_ratios, Projection::Linear).is_none());
@@ -222,7 +222,7 @@ fn a_warm_start_gives_back_its_parameters() {
     for model in MODELS {
         let problem = problem(&dataset, &stage, model);
         let mut known = Parameters::designed(&stage);
-        let fitted = 3 * Model::of(model).fitted;
+        let fitted = 3 * Model::from_kind(model).fitted;
         known.values[..fitted].copy_from_slice(&truth().values[..fitted]);
         let same = |back: Parameters| {
             for (have, want) in back.values.iter().zip(known.values) {

@@ -4,7 +4,7 @@ use super::{Clocks, EXPLAINED_MIN, Records};
 use crate::bus::import::ImportError;
 use crate::bus::import::join::{At, at};
 use crate::bus::import::node_clock::Tick;
-use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
+use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::Vector3;
 use runtime::capacitive::vertical_per_gap;
 
@@ -34,7 +34,7 @@ impl Records<'_> {
                 let (before, after) = (self.at(t_us - half_us)?, self.at(t_us + half_us)?);
                 let per_second = 1e9 / self.period_us;
                 (before.0 == after.0).then(|| FieldRow {
-                    warmth_k: [[0.0; 2]; 3],
+                    temperature_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
                     signal_mm: row.tick.codes.hall.map(|code| hall_mm * f64::from(code)),
                     vertical: (per_gap
@@ -50,7 +50,7 @@ impl Records<'_> {
                 movements.push(first..used.len());
             }
         }
-        Rows::of_movements(used, movements)
+        Rows::from_movements(used, movements)
     }
 
     /// The ticks that have a reference.

@@ -1,4 +1,4 @@
-//! The estimation problem: which rows, which model.
+//! Stage, model and rows of a fit by the pose.
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -8,30 +8,21 @@
 //! # use hallstage_input::shipped::LOG_GZ;
 //! # let reading = log::read_bytes(LOG_GZ, "paper.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! use hallstage_solver::problem::Problem;
-//! use hallstage_solver::problem::draw::{Draw, draw_rows};
-//! use hallstage_solver::problem::model::Model;
+//! use hallstage_solver::estimator::problem::Problem;
+//! use hallstage_solver::estimator::draw::{Draw, draw_rows};
+//! use hallstage_solver::estimator::model::Model;
 //! use runtime::ModelKind;
 //!
 //! let rows = draw_rows(&dataset, 200, Draw::Stratified, 1);
-//! let problem = Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31));
+//! let problem = Problem::new(&dataset, &rows, &stage, Model::from_kind(ModelKind::M31));
 //! assert_eq!((problem.rows.rows.len(), problem.rows.movements_of_log), (200, 57));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod draw;
-pub mod model;
-pub mod parameters;
-#[cfg(test)]
-#[path = "synthetic_for_tests.rs"]
-pub mod synthetic;
-pub mod terms;
-pub mod zero_deviation;
-
-use crate::solve::field::blocks::Rows;
+use super::model::Model;
+use super::rows::Rows;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
-use model::Model;
 use std::sync::Arc;
 
 /// What a solver minimises: the sum of squared pose errors over some rows of a log.
@@ -81,6 +72,8 @@ impl<'a> Problem<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::paper::Parameters;
+    use crate::estimator::synthetic::Protocol;
     use hallstage_input::dataset::Movement;
     use hallstage_input::shipped;
     use runtime::ModelKind;
@@ -88,8 +81,8 @@ mod tests {
     #[test]
     fn thinning_leaves_rows_to_every_movement_that_moves() {
         let stage = shipped::stage();
-        let truth = parameters::Parameters::designed(&stage);
-        let mut dataset = synthetic::Protocol::exact(truth, 20).dataset(&stage);
+        let truth = Parameters::designed(&stage);
+        let mut dataset = Protocol::exact(truth, 20).dataset(&stage);
         // A stage that was left standing for ten times as long as all movements took.
         let moving = dataset.rows.len();
         dataset.rows.resize(11 * moving, dataset.rows[0]);
@@ -102,7 +95,7 @@ mod tests {
             rows: moving..11 * moving,
         });
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
-        let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
+        let problem = Problem::new(&dataset, &all, &stage, Model::from_kind(ModelKind::M31));
         let sizes = |most| -> Vec<usize> {
             let thinned = problem.thinned(most);
             let rows = thinned.rows.movement_rows();

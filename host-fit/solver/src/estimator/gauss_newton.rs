@@ -53,10 +53,7 @@ impl<const W: usize> Normal<W> {
 
     /// The sum over `count` movements, in their order for any number of threads; `None` if a movement cannot be
     /// evaluated.
-    pub fn of_movements(
-        count: usize,
-        of_movement: impl Fn(usize) -> Option<Self> + Sync,
-    ) -> Option<Self> {
+    pub fn sum(count: usize, of_movement: impl Fn(usize) -> Option<Self> + Sync) -> Option<Self> {
         let mut sum = Self::none();
         for start in (0..count).step_by(TOGETHER) {
             let some = start..(start + TOGETHER).min(count);

@@ -1,6 +1,6 @@
 //! The models as a fit sees them: which terms they have and which are fitted.
 
-use super::terms::{MODEL_31, Motion, Term};
+use super::motion::{MODEL_31, Motion, Term};
 use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -55,7 +55,7 @@ pub static MODELS: [Model; 5] = [
         fitted: 6,
         has_zero_deviation: true,
     },
-    // Its terms here are those that it shares with (31); the rest is in `solve::field`.
+    // Its terms here are those that it shares with (31); the rest is in [`terms`](super::terms).
     Model {
         name: "field",
         summary: "As 31, with what a magnet's field does beside its centre line; all six axes must move at once",
@@ -67,7 +67,7 @@ pub static MODELS: [Model; 5] = [
 
 impl Model {
     /// The model of a blob's tag.
-    pub const fn of(kind: ModelKind) -> &'static Self {
+    pub const fn from_kind(kind: ModelKind) -> &'static Self {
         &MODELS[match kind {
             ModelKind::M12 => 0,
             ModelKind::M15 => 1,
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn each_model_stands_at_the_place_of_its_tag() {
         for model in &MODELS {
-            assert_eq!(Model::of(model.kind).name, model.name);
+            assert_eq!(Model::from_kind(model.kind).name, model.name);
             let places = model.parameters().map(|id| id.index);
             assert!(places.eq(0..COUNT));
         }

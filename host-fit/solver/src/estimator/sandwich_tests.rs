@@ -1,6 +1,6 @@
 use super::*;
-use crate::problem::model::Model;
-use crate::problem::synthetic::Protocol;
+use crate::estimator::model::Model;
+use crate::estimator::synthetic::Protocol;
 use crate::solve::{Projection, Solver, SolverOptions};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, STAGE_TOML};
@@ -20,7 +20,7 @@ fn standard_errors_of_the_shipped_log_are_those_of_an_independent_computation() 
     let path = "paper.csv.gz".as_ref();
     let log = read_bytes(LOG_GZ, path, &stage, &ReadOptions::default()).expect("sound");
     let rows: Vec<usize> = (0..log.dataset.rows.len()).collect();
-    let model = Model::of(ModelKind::M31);
+    let model = Model::from_kind(ModelKind::M31);
     let problem = Problem::new(&log.dataset, &rows, &stage, model);
     let options = SolverOptions::new(Projection::Linear, 1);
     let solution = Solver::LeastSquares
@@ -58,7 +58,7 @@ fn standard_errors_match_the_spread_over_repeated_logs() {
         }
         .dataset(&stage);
         let rows: Vec<usize> = (0..dataset.rows.len()).collect();
-        let problem = Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31));
+        let problem = Problem::new(&dataset, &rows, &stage, Model::from_kind(ModelKind::M31));
         let options = SolverOptions::new(Projection::Linear, 1);
         let solution = (Solver::LeastSquares.solve(&problem, &options)).expect("a fit");
         let errors = Sandwich::new(&problem, &solution.parameters).expect("evaluated");

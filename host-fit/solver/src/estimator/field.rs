@@ -1,20 +1,20 @@
 //! Maximum a posteriori: Gauss-Newton on the Hall residuals, first under white noise, then whitened
 //! by the noise that the residuals show.
 
-use super::blocks::Rows;
-use super::carry::Verdict;
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::{FieldParameters, unknowns};
-use super::posterior::{Posterior, warmth_errors};
+use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
+use super::rows::Rows;
 use super::sandwich::ReferenceLag;
+use super::service::Comparison;
+use super::temperature::{Coefficient, Sensors, TemperatureFit};
 use super::terms::COUNT;
-use super::warmth::{Sensors, Warmth};
-use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS, WARMTH};
-use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
-use crate::solve::robust::{HALF, Loss};
+use super::whiten::{COLUMNS, FieldEquations, LAG, Noise, UNKNOWNS};
+use crate::estimator::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
+use crate::estimator::paper::Parameters;
+use crate::estimator::robust::{HALF, Loss};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
@@ -68,9 +68,9 @@ pub struct FieldFigures {
     /// Largest magnitudes of Z, Rx, Ry in the log: m, rad, rad.
     pub vertical_range: [f64; 3],
     /// Whether the field model is better taken than Model (31).
-    pub verdict: Verdict,
+    pub comparison: Comparison,
     /// k and h with their standard errors.
-    pub warmth: Warmth,
+    pub temperature: TemperatureFit,
 }
 
 /// -2 times the log-posterior is their sum, but for a constant.
@@ -138,7 +138,7 @@ impl WhiteFit {
         let places = stage.places_m();
         let sensors = Sensors::new(dataset, stage);
         let mut values = DVector::zeros(UNKNOWNS);
-        let parameters = FieldParameters::of_model_31(start, stage);
+        let parameters = FieldParameters::from_model_31(start, stage);
         values.as_mut_slice()[..COUNT].copy_from_slice(parameters.probes.as_flattened());
         Self {
             weights: vec![1.0; rows.rows.len()],
@@ -209,7 +209,7 @@ impl WhiteFit {
     pub fn finish(mut self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
         let mut covariance = self.covariance(&self.normal()?)?;
         // White noise alone makes the errors too small, never too large: what fails here, fails.
-        let early = self.verdict(stage, &self.posterior(covariance));
+        let early = self.comparison(stage, &self.posterior(covariance));
         if early.loses() {
             return Err(FieldFitError::NotCarried(Box::new(early)));
         }
@@ -233,9 +233,9 @@ impl WhiteFit {
         let covariance = self.covariance(&normal)?;
         let lag = ReferenceLag {
             value_s: self.lag_s(),
-            standard_error_s: covariance[(COUNT, COUNT)].sqrt(),
+            standard_error_s: covariance[(LAG, LAG)].sqrt(),
         };
-        let (posterior, warmth) = self.with_warmth(covariance);
+        let (posterior, temperature) = self.with_temperature(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
         let weight =
@@ -243,8 +243,8 @@ impl WhiteFit {
         let weights = rows.blocks.iter().map(weight);
         let counted = weights.filter(|sum: &f64| *sum >= HALF).count();
         let figures = FieldFigures {
-            verdict: self.verdict(stage, &posterior),
-            warmth,
+            comparison: self.comparison(stage, &posterior),
+            temperature,
             score: Score {
                 chi_squared: normal.chi_squared(),
                 log_determinant: normal.log_determinant,
@@ -271,11 +271,12 @@ impl WhiteFit {
 
     /// The posterior with k and h, and k and h: the values that the rows were compensated with plus the estimated
     /// changes.
-    fn with_warmth(&self, mut covariance: DMatrix<f64>) -> (Posterior, Warmth) {
+    fn with_temperature(&self, mut covariance: DMatrix<f64>) -> (Posterior, TemperatureFit) {
         let mut temperature = self.temperature;
-        for (k, beyond) in self.at.values.as_slice()[WARMTH..].iter().enumerate() {
-            if self.sensors.spans_k[k % 2] > 0.0 {
-                temperature.per_mk[k / 2][k % 2] += 1e-3 * beyond;
+        for of in Coefficient::ALL {
+            if self.sensors.spans_k[of.sensor] > 0.0 {
+                let change = self.at.values[of.unknown()];
+                temperature.per_mk[of.probe][of.sensor] += 1e-3 * change;
             }
         }
         let (rows, white_mm) = (&self.rows.rows, self.noise.white_mm[0]);
@@ -285,15 +286,15 @@ impl WhiteFit {
         self.sensors.complete(&mut covariance, signal_to_noise);
         let of_parameters = self.posterior(covariance.clone());
         let posterior = match temperature.is_used() {
-            true => of_parameters.with_warmth(&covariance),
+            true => of_parameters.with_temperature(&covariance),
             false => of_parameters,
         };
-        let warmth = Warmth {
+        let temperature = TemperatureFit {
             temperature,
-            error_per_k: warmth_errors(&posterior.covariance).unwrap_or_default(),
+            error_per_k: temperature_errors(&posterior.covariance).unwrap_or_default(),
             spans_k: self.sensors.spans_k,
         };
-        (posterior, warmth)
+        (posterior, temperature)
     }
 
     fn parameters(&self) -> FieldParameters {
@@ -301,7 +302,7 @@ impl WhiteFit {
     }
 
     fn lag_s(&self) -> f64 {
-        self.at.values[COUNT]
+        self.at.values[LAG]
     }
 
     fn equations(&self) -> FieldEquations<'_> {
@@ -329,10 +330,10 @@ impl WhiteFit {
         Posterior::new(covariance, &self.parameters(), &self.noise)
     }
 
-    fn verdict(&self, stage: &Stage, posterior: &Posterior) -> Verdict {
+    fn comparison(&self, stage: &Stage, posterior: &Posterior) -> Comparison {
         let rows = &self.rows;
         let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
-        Verdict::new(&self.parameters(), posterior, &self.start, stage, ranges)
+        Comparison::new(&self.parameters(), posterior, &self.start, stage, ranges)
     }
 
     fn white_mm(&self, stage: &Stage) -> [f64; 3] {

@@ -10,10 +10,10 @@ use super::parameters::FieldParameters;
 use super::pose::{COLUMNS, Columns, Decoder, ERROR, LAG};
 use super::posterior::Posterior;
 use super::terms::PER_PROBE;
-use crate::problem::Problem;
-use crate::problem::model::ParameterId;
-use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::model::ParameterId;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
@@ -90,9 +90,9 @@ impl Sandwich {
         });
         let place = |&index: &usize| index % 3 * PER_PROBE + index / 3;
         let places = determined.iter().map(place).collect();
-        let of_31 = FieldParameters::of_model_31(parameters, problem.stage);
+        let of_31 = FieldParameters::from_model_31(parameters, problem.stage);
         Some(Self {
-            posterior: Posterior::of_some(places, covariance, &of_31),
+            posterior: Posterior::from_sandwich(places, covariance, &of_31),
             motion_error: std::array::from_fn(|k| errors.independent[k]),
             undetermined: (problem.model.free())
                 .filter(|id| errors.undetermined.contains(&id.index))
@@ -188,7 +188,7 @@ impl Sums {
         let root = covariance
             .cholesky()
             .map_or_else(Matrix3::zeros, |s| s.l().transpose());
-        let independent = Normal::of_movements(movements.len(), |movement| {
+        let independent = Normal::sum(movements.len(), |movement| {
             let rows = rows_of(movement);
             let mean = decoder.mean(problem, rows)?;
             let mut sums: Normal<COLUMNS> = Normal::none();

@@ -2,11 +2,11 @@
 
 use super::linear::{Point, parameters_of};
 use super::pose::{COLUMNS, Decoder};
-use crate::problem::Problem;
-use crate::problem::model::{COUNT, Model, ParameterId};
-use crate::problem::parameters::{Parameters, SLOPES, THETA, search_box};
-use crate::problem::zero_deviation::ZeroDeviation;
-use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
+use crate::estimator::gauss_newton::{self, Limits, Solved, Unknowns};
+use crate::estimator::model::{COUNT, Model, ParameterId};
+use crate::estimator::paper::{Parameters, SLOPES, THETA, search_box};
+use crate::estimator::problem::Problem;
+use crate::estimator::zero_deviation::ZeroDeviation;
 use crate::solve::{Solution, SolveError};
 use hallstage_input::stage::{Range, Stage};
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -226,7 +226,7 @@ pub fn zero_deviations(problem: &Problem, parameters: &Parameters) -> Vec<ZeroDe
         }
         let mean = sum.map(|sum| sum / weights * 1e-6);
         let range = &problem.stage.search.delta_m;
-        zeros[number] = ZeroDeviation::of_mean_error(parameters, mean, range);
+        zeros[number] = ZeroDeviation::from_mean_error(parameters, mean, range);
     }
     zeros
 }

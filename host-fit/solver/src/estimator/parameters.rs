@@ -1,11 +1,12 @@
 //! The values of the 81 parameters, and the decoder's constants made of them.
 
+use super::temperature::Coefficient;
 use super::terms::{
     CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
 };
-use super::whiten::{UNKNOWNS, WARMTH};
-use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::Unknowns;
+use super::whiten::UNKNOWNS;
+use crate::estimator::gauss_newton::Unknowns;
+use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use runtime::geometry::{ProbeGeometry, SensingAxes};
@@ -34,7 +35,7 @@ pub(super) const PLACE_M: f64 = 0.03;
 
 impl FieldParameters {
     /// Model (31) as a field model: E = 0, p = 0.
-    pub fn of_model_31(parameters: &Parameters, stage: &Stage) -> Self {
+    pub fn from_model_31(parameters: &Parameters, stage: &Stage) -> Self {
         let (geometry, sensitivity) = (parameters.geometry(), parameters.sensitivity());
         let probe = |k: usize| {
             let s = &sensitivity[k];
@@ -55,7 +56,7 @@ impl FieldParameters {
     }
 
     /// Of the values of A's, B's and C's parameters in a row.
-    pub fn of_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
+    pub fn from_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
         Self {
@@ -66,7 +67,7 @@ impl FieldParameters {
     }
 
     /// The parameters in a blob; `None` for another model.
-    pub fn of_set(set: &ParameterSet, stage: &Stage) -> Option<Self> {
+    pub fn from_set(set: &ParameterSet, stage: &Stage) -> Option<Self> {
         Some(Self {
             probes: values_of(set)?,
             gain_per_k: [[0.0; 2]; 3],
@@ -76,7 +77,7 @@ impl FieldParameters {
 
     /// The same without the drawing: the probes stand where the slopes of their sensitivities say, which the
     /// drawing changes by a part in 2000.
-    pub fn of_blob(set: &ParameterSet) -> Option<Self> {
+    pub fn from_blob(set: &ParameterSet) -> Option<Self> {
         let probes = values_of(set)?;
         Some(Self {
             probes,
@@ -87,11 +88,11 @@ impl FieldParameters {
 
     /// Lever arms, misalignments and sensitivities: the part that is Model (31).
     pub fn model_31(&self) -> Parameters {
-        Parameters::of_model_31(&self.geometry(), &self.probes.map(|p| sensitivity(&p)))
+        Parameters::from_model_31(&self.geometry(), &self.probes.map(|p| sensitivity(&p)))
     }
 
     /// What gains of A, B, C, as parts, add to each parameter: eta, a, b and c are scaled alike.
-    pub fn by_gain(&self, parts: [f64; 3]) -> [f64; COUNT] {
+    pub fn gain_change(&self, parts: [f64; 3]) -> [f64; COUNT] {
         std::array::from_fn(|k| {
             let (probe, term) = (k / PER_PROBE, k % PER_PROBE);
             match (ETA..CARRY).contains(&term) {
@@ -244,8 +245,8 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
 /// Standard deviation of a temperature coefficient that stays at its prior, 1/K.
 pub const HELD: f64 = 1e-9;
 
-/// All parameters, the lag, k and h with their prior; `warmth` are the prior standard deviations of k and h.
-pub fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
+/// All parameters, the lag, k and h with their prior; `temperature` are the prior standard deviations of k and h.
+pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2]) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {
         let own = probe * PER_PROBE;
@@ -264,9 +265,9 @@ pub fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
             prior[(a, a)] += weight * per_a * per_a;
         }
     }
-    for k in WARMTH..UNKNOWNS {
-        let deviation = warmth[(k - WARMTH) % 2];
-        prior[(k, k)] = 1.0 / (deviation * deviation);
+    for of in Coefficient::ALL {
+        let deviation = temperature[of.sensor];
+        prior[(of.unknown(), of.unknown())] = 1.0 / (deviation * deviation);
     }
     Unknowns {
         origin: DVector::zeros(UNKNOWNS),
@@ -279,8 +280,8 @@ pub fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::field::probe::probes;
-    use crate::solve::field::sample_for_tests::{M_PER_CODE, parameters as sample};
+    use crate::estimator::probe::probes;
+    use crate::estimator::sample_for_tests::{M_PER_CODE, parameters as sample};
     use proptest::prelude::*;
 
     #[test]

@@ -6,7 +6,7 @@
 
 use super::probe::{Probe, Reading};
 use super::terms::PER_PROBE;
-use crate::solve::robust::HALF;
+use crate::estimator::robust::HALF;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub struct FieldRow {
     /// Its change by time: mm/s, mm/s, mrad/s.
     pub rate_mm_per_s: [f64; 3],
     /// dM and dH over the gain of A, B, C that [`Self::signal_mm`] is compensated for, K.
-    pub warmth_k: [[f64; 2]; 3],
+    pub temperature_k: [[f64; 2]; 3],
     /// How much it counts: 1 unless a robust loss says less.
     pub weight: f64,
 }
@@ -80,7 +80,7 @@ pub struct Block {
     /// Derivatives by the lag of the reference, mm/s.
     pub by_lag: [f64; 3],
     /// Derivatives by k and h of each probe, mm K.
-    pub by_warmth: [[f64; 2]; 3],
+    pub by_temperature: [[f64; 2]; 3],
 }
 
 impl Rows {
@@ -112,12 +112,12 @@ impl Rows {
         Self {
             numbers,
             movements_of_log: dataset.movements.len(),
-            ..Self::of_movements(rows, movements)
+            ..Self::from_movements(rows, movements)
         }
     }
 
     /// Rows in time order, and where each movement stands among them.
-    pub fn of_movements(rows: Vec<FieldRow>, movements: Vec<Range<usize>>) -> Self {
+    pub fn from_movements(rows: Vec<FieldRow>, movements: Vec<Range<usize>>) -> Self {
         let (planar_range_mm, vertical_range) = ranges(&rows, &movements);
         let most: [f64; 6] = std::array::from_fn(|axis| {
             2.0 * MOTION_MAX
@@ -230,7 +230,7 @@ impl Rows {
             let residual = move |row: &FieldRow| {
                 let planar_mm = row.planar_mm(lag_s, offset);
                 [0, 1, 2].map(|k| {
-                    let gain = probes[k].gain(row.warmth_k[k]);
+                    let gain = probes[k].gain(row.temperature_k[k]);
                     row.signal_mm[k] - gain * probes[k].signal_mm(planar_mm, row.vertical)
                 })
             };
@@ -263,7 +263,7 @@ impl Rows {
         Self {
             numbers: self.numbers.clone(),
             movements_of_log: self.movements_of_log,
-            ..Self::of_movements(rows, thinned)
+            ..Self::from_movements(rows, thinned)
         }
     }
 
@@ -313,7 +313,7 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
     let changes_k = temperature.changes_k(temperature_mc);
     let gain = temperature.gain_at(temperature_mc);
     FieldRow {
-        warmth_k: gain.map(|gain| changes_k.map(|change| change / gain)),
+        temperature_k: gain.map(|gain| changes_k.map(|change| change / gain)),
         time_s: row.t_us as f64 * 1e-6,
         signal_mm: row.signal_m.map(|s| s * 1e3),
         vertical: row.vertical,
@@ -344,7 +344,8 @@ fn mean_row(rows: &[FieldRow]) -> FieldRow {
         vertical: three(&|row| row.vertical),
         reference_mm: three(&|row| row.reference_mm),
         rate_mm_per_s: three(&|row| row.rate_mm_per_s),
-        warmth_k: [0, 1, 2].map(|k| [0, 1].map(|sensor| mean(&|row| row.warmth_k[k][sensor]))),
+        temperature_k: [0, 1, 2]
+            .map(|k| [0, 1].map(|sensor| mean(&|row| row.temperature_k[k][sensor]))),
         weight,
     }
 }
@@ -374,7 +375,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
         by_pose: [[0.0; 3]; 3],
         by_parameter: [[0.0; PER_PROBE]; 3],
         by_lag: [0.0; 3],
-        by_warmth: [[0.0; 2]; 3],
+        by_temperature: [[0.0; 2]; 3],
     };
     for row in rows {
         let planar_mm = row.planar_mm(lag_s, offset_mm);
@@ -387,10 +388,10 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
                 by_parameter,
                 ..
             } = probe.read(planar_mm, row.vertical);
-            let gain = probe.gain(row.warmth_k[k]);
+            let gain = probe.gain(row.temperature_k[k]);
             sum.residual_mm[k] += row.weight * (row.signal_mm[k] - gain * signal_mm);
-            for (sum, warmth_k) in sum.by_warmth[k].iter_mut().zip(row.warmth_k[k]) {
-                *sum += row.weight * signal_mm * warmth_k;
+            for (sum, temperature_k) in sum.by_temperature[k].iter_mut().zip(row.temperature_k[k]) {
+                *sum += row.weight * signal_mm * temperature_k;
             }
             for (axis, by) in by_pose.into_iter().enumerate() {
                 let by = row.weight * gain * by;
@@ -409,7 +410,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
         sum.by_lag[k] *= share;
         sum.by_pose[k].iter_mut().for_each(|x| *x *= share);
         sum.by_parameter[k].iter_mut().for_each(|x| *x *= share);
-        sum.by_warmth[k].iter_mut().for_each(|x| *x *= share);
+        sum.by_temperature[k].iter_mut().for_each(|x| *x *= share);
     }
     sum
 }

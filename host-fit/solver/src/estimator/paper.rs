@@ -41,7 +41,10 @@ impl Parameters {
     }
 
     /// The parameters of a blob or a calibration with the sensitivities of Model (31).
-    pub fn of_model_31(geometry: &ProbeGeometry<f64>, sensitivity: &[Sensitivity<f64>; 3]) -> Self {
+    pub fn from_model_31(
+        geometry: &ProbeGeometry<f64>,
+        sensitivity: &[Sensitivity<f64>; 3],
+    ) -> Self {
         let slopes = sensitivity.map(|s| [s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
         Self::new(geometry, sensitivity.map(|s| s.eta), slopes)
     }
@@ -109,13 +112,13 @@ impl Parameters {
 impl Parameters {
     /// The parameters that a blob carries, in `f64`: of a field model those that it shares with
     /// Model (31).
-    pub fn of_set(set: &ParameterSet) -> Self {
+    pub fn from_set(set: &ParameterSet) -> Self {
         let geometry = ProbeGeometry {
             lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
             misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
         };
         let sensitivity = set.probes.sensitivities().map(Sensitivity::rounded);
-        Self::of_model_31(&geometry, &sensitivity)
+        Self::from_model_31(&geometry, &sensitivity)
     }
 }
 

@@ -1,10 +1,10 @@
 //! The least-squares fit against known truth and its own derivatives.
 
 use super::*;
-use crate::problem::model::Model;
-use crate::problem::synthetic::Protocol;
-use crate::solve::field::linear::point_of;
-use crate::solve::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::linear::point_of;
+use crate::estimator::model::Model;
+use crate::estimator::synthetic::Protocol;
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
 use nalgebra::DVector;
@@ -25,7 +25,7 @@ fn from_array(first: [f64; 18]) -> Parameters {
 
 fn model_31<'a>(dataset: &hallstage_input::dataset::Dataset, stage: &'a Stage) -> Problem<'a> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    Problem::new(dataset, &all, stage, Model::of(ModelKind::M31))
+    Problem::new(dataset, &all, stage, Model::from_kind(ModelKind::M31))
 }
 
 fn normal(problem: &Problem, parameters: &Parameters) -> Option<Normal<COLUMNS>> {

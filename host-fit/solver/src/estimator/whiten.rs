@@ -6,16 +6,17 @@
 //! same time: without drift this is the same as solving for each movement's offset. A and B are
 //! whitened jointly with C, for all three see the same reference.
 
-use super::blocks::{Block, Rows};
 use super::parameters::FieldParameters;
 use super::probe::probes;
+use super::rows::{Block, Rows};
+use super::temperature::Coefficient;
 use super::terms::{COUNT, PER_PROBE};
-use crate::solve::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::gauss_newton::{Equations, Normal, Point};
 
 /// Unknowns: the parameters, the lag of the reference, then k and h of A, B, C beyond their priors.
-pub const UNKNOWNS: usize = WARMTH + 6;
-/// The first column of k and h.
-pub const WARMTH: usize = COUNT + 1;
+pub const UNKNOWNS: usize = LAG + 1 + Coefficient::ALL.len();
+/// The column of the lag.
+pub const LAG: usize = COUNT;
 /// The column of the lag's growth by time, which an alignment of two clocks takes too.
 pub const LAG_RATE: usize = UNKNOWNS;
 /// Columns: these and the residual.
@@ -52,9 +53,10 @@ impl FieldEquations<'_> {
     /// The parameters at a point.
     pub fn parameters(&self, at: &Point) -> FieldParameters {
         let values = at.values.as_slice();
-        let mut parameters = FieldParameters::of_values(values, self.places);
-        let warmth = parameters.gain_per_k.as_flattened_mut();
-        warmth.copy_from_slice(&values[WARMTH..UNKNOWNS]);
+        let mut parameters = FieldParameters::from_values(values, self.places);
+        for of in Coefficient::ALL {
+            parameters.gain_per_k[of.probe][of.sensor] = values[of.unknown()];
+        }
         parameters
     }
 
@@ -68,12 +70,12 @@ impl FieldEquations<'_> {
     }
 
     /// Of blocks that are evaluated already, with no offset.
-    pub fn of_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
+    pub fn sum_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
         let movement = |k: usize| {
             let blocks = &blocks[self.rows.movements[k].clone()];
             Some(self.sums(k, blocks, [0.0; 3], &[]))
         };
-        let sums = Normal::of_movements(self.rows.movements.len(), movement);
+        let sums = Normal::sum(self.rows.movements.len(), movement);
         sums.unwrap_or_else(Normal::none)
     }
 
@@ -84,7 +86,7 @@ impl FieldEquations<'_> {
         for (k, offset_mm) in at.offsets.iter().enumerate() {
             let blocks = self
                 .rows
-                .evaluate_movement(k, &probes, at.values[COUNT], *offset_mm);
+                .evaluate_movement(k, &probes, at.values[LAG], *offset_mm);
             self.filter(k, &blocks, *offset_mm, self.sizes(at), |gain, row| {
                 rows.push(row);
                 gains.push(gain);
@@ -162,8 +164,8 @@ impl FieldEquations<'_> {
 impl<const W: usize> Equations<W> for FieldEquations<'_> {
     fn normal(&self, at: &Point) -> Option<Normal<W>> {
         let probes = probes(&self.parameters(at));
-        Normal::of_movements(self.rows.movements.len(), |k| {
-            let (lag_s, offset_mm) = (at.values[COUNT], at.offsets[k]);
+        Normal::sum(self.rows.movements.len(), |k| {
+            let (lag_s, offset_mm) = (at.values[LAG], at.offsets[k]);
             let blocks = self.rows.evaluate_movement(k, &probes, lag_s, offset_mm);
             Some(self.sums(k, &blocks, offset_mm, self.sizes(at)))
         })
@@ -179,9 +181,10 @@ fn columns<const W: usize>(block: &Block) -> [[f64; W]; 3] {
     for (probe, column) in columns.iter_mut().enumerate() {
         let own = probe * PER_PROBE;
         column[own..own + PER_PROBE].copy_from_slice(&block.by_parameter[probe]);
-        column[COUNT] = block.by_lag[probe];
-        let warmth = WARMTH + 2 * probe;
-        column[warmth..warmth + 2].copy_from_slice(&block.by_warmth[probe]);
+        column[LAG] = block.by_lag[probe];
+        for (sensor, by) in block.by_temperature[probe].into_iter().enumerate() {
+            column[Coefficient::new(probe, sensor).unknown()] = by;
+        }
         column[LAG_RATE] = block.by_lag[probe] * block.time_s;
         column[W - 1] = block.residual_mm[probe];
     }
@@ -290,7 +293,7 @@ mod tests {
     use super::*;
 
     const RESIDUAL: usize = COLUMNS - 1;
-    use crate::solve::field::sample_for_tests::{Run, parameters};
+    use crate::estimator::sample_for_tests::{Run, parameters};
     use nalgebra::{Cholesky, DMatrix};
 
     /// The same sums from the covariance of all residuals of each movement, written out whole:
@@ -319,7 +322,7 @@ mod tests {
                 resets_mm,
                 faults: &[],
             };
-            let found = equations.of_blocks(&blocks);
+            let found = equations.sum_blocks(&blocks);
 
             let mut products = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
             let mut log_determinant = 0.0;
@@ -342,7 +345,7 @@ mod tests {
                 let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
                     let (block, probe) = (&blocks[i / 3], i % 3);
                     match j {
-                        COUNT => block.by_lag[probe],
+                        LAG => block.by_lag[probe],
                         LAG_RATE => block.by_lag[probe] * block.time_s,
                         RESIDUAL => block.residual_mm[probe],
                         _ if j < COUNT && j / PER_PROBE == probe => {

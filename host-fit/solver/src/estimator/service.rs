@@ -4,7 +4,7 @@ use super::parameters::FieldParameters;
 use super::posterior::{FORM_MM, PoseErrors, Posterior};
 use super::probe::probes;
 use super::terms::COUNT;
-use crate::problem::parameters::Parameters;
+use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 use runtime::VerticalPose;
@@ -139,7 +139,7 @@ fn difference(
 
 /// Which of the two models is better taken, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
+pub struct Comparison {
     /// Whether it is the field model.
     pub field: bool,
     /// Whether only the declared errors of the resets let the log carry it.
@@ -223,7 +223,7 @@ impl ServiceVariance {
     }
 }
 
-impl Verdict {
+impl Comparison {
     /// Of a fit beside one of Model (31) to the same rows, over X, Y, Rz and Z, Rx, Ry of the
     /// largest magnitudes `ranges` (m, rad).
     pub fn new(
@@ -233,7 +233,7 @@ impl Verdict {
         stage: &Stage,
         ranges: ([f64; 3], [f64; 3]),
     ) -> Self {
-        let model_31 = FieldParameters::of_model_31(model_31, stage);
+        let model_31 = FieldParameters::from_model_31(model_31, stage);
         let service = ServiceVariance::new(parameters, posterior, &model_31, ranges);
         let by_resets = stage.reset_sd.is_some() && service.loses() && service.is_better();
         Self {
@@ -249,7 +249,7 @@ impl Verdict {
     }
 }
 
-impl std::fmt::Display for Verdict {
+impl std::fmt::Display for Comparison {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let words = |[x, y, rz]: [f64; 3]| {
             format!("{x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")

@@ -10,11 +10,11 @@
 //! Noise alone does not come near k, so every row of a clean log has the weight 1, and the result is that of plain
 //! least squares, bit for bit.
 
-use super::field::least_squares::solve;
-use super::field::pose::Decoder;
-use super::{Solution, SolveError};
-use crate::problem::Problem;
-use crate::problem::parameters::Parameters;
+use super::least_squares::solve;
+use super::pose::Decoder;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
+use crate::solve::{Solution, SolveError};
 use hallstage_input::statistics::median;
 use std::ops::Range;
 use std::sync::Arc;

@@ -2,9 +2,10 @@
 
 use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
+use super::temperature::Coefficient;
 use super::terms::{self, CARRY, COUNT, PER_PROBE, name};
-use super::whiten::Noise;
-use crate::problem::model;
+use super::whiten::{LAG, Noise};
+use crate::estimator::model;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
 use runtime::matrix::{from_rows, inverse, to_rows};
 
@@ -82,30 +83,36 @@ pub fn covariance_at(
     change_k: [f64; 2],
 ) -> DMatrix<f64> {
     let mut acts = DMatrix::identity(COUNT, covariance.nrows());
-    for (k, mut column) in acts.column_iter_mut().skip(COUNT).enumerate() {
-        let mut parts = [0.0; 3];
-        parts[k / 2] = change_k[k % 2];
-        column.copy_from_slice(&parameters.by_gain(parts));
+    for of in Coefficient::ALL {
+        if of.row() < covariance.nrows() {
+            let mut parts = [0.0; 3];
+            parts[of.probe] = change_k[of.sensor];
+            let mut column = acts.column_mut(of.row());
+            column.copy_from_slice(&parameters.gain_change(parts));
+        }
     }
     &acts * covariance * acts.transpose()
 }
 
 /// Standard errors of (k, h) of A, B, C, 1/K, from a [`Posterior::covariance`]; `None` without sensors of
 /// temperature.
-pub fn warmth_errors(covariance: &DMatrix<f64>) -> Option<[[f64; 2]; 3]> {
-    let error = |k: usize| covariance[(k, k)].sqrt();
+pub fn temperature_errors(covariance: &DMatrix<f64>) -> Option<[[f64; 2]; 3]> {
+    let error = |probe: usize, sensor: usize| {
+        let row = Coefficient::new(probe, sensor).row();
+        covariance[(row, row)].sqrt()
+    };
     (covariance.nrows() > COUNT)
-        .then(|| [0, 1, 2].map(|probe| [0, 1].map(|k| error(COUNT + 2 * probe + k))))
+        .then(|| [0, 1, 2].map(|probe| [0, 1].map(|sensor| error(probe, sensor))))
 }
 
 impl Posterior {
     pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
         let covariance = with_lag.view((0, 0), (COUNT, COUNT)).into_owned();
-        Self::of_parameters(covariance, parameters, noise)
+        Self::from_covariance(covariance, parameters, noise)
     }
 
     /// Of parameters with this covariance, for probes with this noise.
-    pub fn of_parameters(
+    pub fn from_covariance(
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
         noise: &Noise,
@@ -119,7 +126,7 @@ impl Posterior {
     }
 
     /// Of some of the parameters.
-    pub const fn of_some(
+    pub const fn from_sandwich(
         determined: Vec<usize>,
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
@@ -166,8 +173,8 @@ impl Posterior {
 
     /// The posterior with k and h; `with_lag` is the covariance of all unknowns.
     #[must_use]
-    pub(super) fn with_warmth(mut self, with_lag: &DMatrix<f64>) -> Self {
-        self.covariance = with_lag.clone().remove_row(COUNT).remove_column(COUNT);
+    pub(super) fn with_temperature(mut self, with_lag: &DMatrix<f64>) -> Self {
+        self.covariance = with_lag.clone().remove_row(LAG).remove_column(LAG);
         self.determined = (0..self.covariance.nrows()).collect();
         self
     }
@@ -178,7 +185,7 @@ impl Posterior {
     }
 
     /// Standard errors of the parameters of Model (31), in the order and the units of
-    /// [`Parameters`](crate::problem::parameters::Parameters).
+    /// [`Parameters`](crate::estimator::paper::Parameters).
     pub fn standard_errors_31(&self) -> [Option<f64>; model::COUNT] {
         std::array::from_fn(|k| {
             let place = k % 3 * PER_PROBE + k / 3;
@@ -255,8 +262,8 @@ impl Posterior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::field::sample_for_tests::parameters;
-    use crate::solve::field::whiten::UNKNOWNS;
+    use crate::estimator::sample_for_tests::parameters;
+    use crate::estimator::whiten::UNKNOWNS;
     use runtime::VerticalPose;
 
     /// A small error of one parameter at a time, decoded, against what is predicted for it; the

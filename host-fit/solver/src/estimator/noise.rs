@@ -1,10 +1,10 @@
 //! The noise of a log from the residuals of a fit: white at the probes, a walk of the reference.
 
-use super::blocks::{Block, Rows};
 use super::probe::Probe;
-use super::terms::{COUNT, PER_PROBE};
-use super::whiten::{Noise, UNKNOWNS};
-use crate::solve::robust::HALF;
+use super::rows::{Block, Rows};
+use super::terms::PER_PROBE;
+use super::whiten::{LAG, Noise, UNKNOWNS};
+use crate::estimator::robust::HALF;
 use crate::statistics::SecondDifferences;
 use hallstage_input::stage::Stage;
 use nalgebra::DMatrix;
@@ -166,7 +166,7 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
                 sum.error[axis] += weight * block.residual_mm[probe];
                 sum.white[axis] += block.rows * white * white;
                 let by = &mut sum.by_unknown[axis];
-                by[COUNT] += weight * block.by_lag[probe];
+                by[LAG] += weight * block.by_lag[probe];
                 let own = &mut by[probe * PER_PROBE..(probe + 1) * PER_PROBE];
                 for (sum, x) in own.iter_mut().zip(&block.by_parameter[probe]) {
                     *sum += weight * x;

@@ -3,7 +3,7 @@
 //! Given the other parameters the pose is linear in it: delta = eta (PM mean pose error of the
 //! movement).
 
-use crate::problem::parameters::Parameters;
+use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Range;
 use runtime::PlanarPose;
 use runtime::matrix::inverse;
@@ -29,7 +29,7 @@ impl ZeroDeviation {
     };
 
     /// The zero deviation that takes off a mean pose error (m, m, rad).
-    pub fn of_mean_error(parameters: &Parameters, mean_error: [f64; 3], range: &Range) -> Self {
+    pub fn from_mean_error(parameters: &Parameters, mean_error: [f64; 3], range: &Range) -> Self {
         let plane = parameters.geometry().plane();
         let pose = PlanarPose::from_array(mean_error);
         let delta_m = zero_deviation_m(&plane, parameters.eta(), &pose);
@@ -67,12 +67,12 @@ mod tests {
             low: -10e-6,
             high: 10e-6,
         };
-        let within = ZeroDeviation::of_mean_error(&designed, [3e-6, 2e-6, 10e-6], &range);
+        let within = ZeroDeviation::from_mean_error(&designed, [3e-6, 2e-6, 10e-6], &range);
         for (have, want) in within.delta_m.iter().zip([3.975e-6, 0.025e-6, -0.6e-6]) {
             assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
         }
         assert!(!within.is_beyond && within.pose == [3e-6, 2e-6, 10e-6]);
-        let beyond = ZeroDeviation::of_mean_error(&designed, [-30e-6, 40e-6, 0.0], &range);
+        let beyond = ZeroDeviation::from_mean_error(&designed, [-30e-6, 40e-6, 0.0], &range);
         assert!(beyond.is_beyond && beyond.pose == [-30e-6, 40e-6, 0.0]);
         let given = ZeroDeviation::given(&designed, beyond.delta_m);
         for (have, want) in given.pose.iter().zip(beyond.pose) {

@@ -73,8 +73,8 @@ mod tests {
     /// A log with movements of the sizes given: a draw looks at nothing else.
     fn log(sizes: &[usize]) -> Dataset {
         let stage = shipped::stage();
-        let truth = crate::problem::parameters::Parameters::designed(&stage);
-        let row = crate::problem::synthetic::Protocol::exact(truth, 1)
+        let truth = crate::estimator::paper::Parameters::designed(&stage);
+        let row = crate::estimator::synthetic::Protocol::exact(truth, 1)
             .dataset(&stage)
             .rows[0];
         let mut dataset = Dataset::default();

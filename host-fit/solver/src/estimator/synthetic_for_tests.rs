@@ -1,7 +1,7 @@
 //! Logs made from Model (31) itself, by the paper's protocol: for tests, where the true parameters must
 //! be known. Other crates include this file.
 
-use crate::problem::parameters::Parameters;
+use crate::estimator::paper::Parameters;
 use hallstage_input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use hallstage_input::stage::Stage;
 use hallstage_simulate::protocol::TABLE_6;

@@ -1,14 +1,14 @@
 //! Why the field model can't be fitted to a log.
 
-use super::carry::Verdict;
-use crate::problem::terms::shown;
+use super::service::Comparison;
+use crate::estimator::motion::shown;
 
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FieldFitError {
     /// The field model would be worse than Model (31).
     #[error("{0}")]
-    NotCarried(Box<Verdict>),
+    NotCarried(Box<Comparison>),
     /// The normal equations can't be solved.
     #[error(
         "the log does not determine the field model: several parameters show only together. Record all six axes \

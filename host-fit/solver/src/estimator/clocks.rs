@@ -1,14 +1,14 @@
 //! What is wrong with the clocks of a record: the lag of the reference and how it grows, fitted
 //! together with all that a stage as designed may differ in.
 
-use super::blocks::Rows;
 use super::noise::{USUAL_DRIFT_MM, white_mm};
 use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
 use super::probe::probes;
+use super::rows::Rows;
 use super::terms::{COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
-use super::whiten::{COLUMNS, FieldEquations, LAG_RATE, Noise};
-use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::{Equations, Normal, Point, Unknowns};
+use super::whiten::{COLUMNS, FieldEquations, LAG, LAG_RATE, Noise};
+use crate::estimator::gauss_newton::{Equations, Normal, Point, Unknowns};
+use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 
@@ -44,7 +44,7 @@ pub struct Lag {
 impl<'s> Alignment<'s> {
     /// Only the design is known.
     pub fn new(stage: &'s Stage) -> Self {
-        let designed = FieldParameters::of_model_31(&Parameters::designed(stage), stage);
+        let designed = FieldParameters::from_model_31(&Parameters::designed(stage), stage);
         let mut origin = DVector::zeros(LAG_RATE + 1);
         origin.as_mut_slice()[..COUNT].copy_from_slice(designed.probes.as_flattened());
         let mut deviations = DVector::zeros(LAG_RATE + 1);
@@ -58,7 +58,7 @@ impl<'s> Alignment<'s> {
             probe[SLOPES] = FALL_PER_M.abs();
             probe[SLOPES + 1..SLOPES + 3].fill(FALL_PER_M.abs());
         }
-        deviations[COUNT] = LAG_S;
+        deviations[LAG] = LAG_S;
         deviations[LAG_RATE] = RATE;
         Self {
             stage,
@@ -85,13 +85,13 @@ impl<'s> Alignment<'s> {
         self.x += &step;
         let covariance = &self.unknowns.basis * factor.inverse() * &self.unknowns.basis * excess;
         let at = |time_s: f64| {
-            let cross = 2.0 * time_s * covariance[(COUNT, LAG_RATE)];
+            let cross = 2.0 * time_s * covariance[(LAG, LAG_RATE)];
             let rate = time_s * time_s * covariance[(LAG_RATE, LAG_RATE)];
-            (covariance[(COUNT, COUNT)] + cross + rate).max(0.0).sqrt()
+            (covariance[(LAG, LAG)] + cross + rate).max(0.0).sqrt()
         };
         let [first, last] = [rows.rows.first()?, rows.rows.last()?];
         Some(Lag {
-            value_s: step[COUNT] * LAG_S,
+            value_s: step[LAG] * LAG_S,
             rate: step[LAG_RATE] * RATE,
             standard_errors_s: [at(first.time_s), at(last.time_s)],
             excess,
@@ -101,9 +101,9 @@ impl<'s> Alignment<'s> {
     /// The lag of some rows with all other unknowns fixed, and its standard error, s.
     pub fn own_lag_s(&self, rows: &Rows) -> Option<[f64; 2]> {
         let normal: Normal<COLUMNS> = self.equations(rows).normal(&self.point(rows))?;
-        let information = normal.curvature(COUNT, COUNT);
+        let information = normal.curvature(LAG, LAG);
         Some([
-            normal.descent(COUNT) / information,
+            normal.descent(LAG) / information,
             information.sqrt().recip(),
         ])
     }
@@ -111,7 +111,7 @@ impl<'s> Alignment<'s> {
     /// The lag itself is in the reference of the rows.
     fn point(&self, rows: &Rows) -> Point {
         let mut values = self.unknowns.values(&self.x);
-        values.as_mut_slice()[COUNT..].fill(0.0);
+        values.as_mut_slice()[LAG..].fill(0.0);
         Point {
             values,
             offsets: vec![[0.0; 3]; rows.movements.len()],
@@ -120,7 +120,7 @@ impl<'s> Alignment<'s> {
 
     fn equations<'r>(&self, rows: &'r Rows) -> FieldEquations<'r> {
         let point = self.point(rows);
-        let parameters = FieldParameters::of_values(point.values.as_slice(), self.places);
+        let parameters = FieldParameters::from_values(point.values.as_slice(), self.places);
         let probes = probes(&parameters);
         FieldEquations {
             rows,

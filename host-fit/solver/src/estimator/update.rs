@@ -5,16 +5,16 @@
 //! normal. This needs no inverse, so a change may be of one parameter or of all, with or without
 //! an old posterior. The lag of the reference is an unknown of every log.
 
-use super::blocks::Rows;
 use super::error::FieldFitError;
 use super::noise::white_mm;
 use super::parameters::FieldParameters;
 use super::posterior::Posterior;
 use super::probe::probes;
+use super::rows::Rows;
+use super::temperature::OF_SENSORS;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
-use super::warmth::OF_SENSORS;
-use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS};
-use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
+use super::whiten::{COLUMNS, FieldEquations, LAG, Noise, UNKNOWNS};
+use crate::estimator::gauss_newton::{self, Limits, Solved, Unknowns};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -65,15 +65,15 @@ impl Change {
             let gain = |probe: usize| {
                 let mut parts = [0.0; 3];
                 parts[probe] = GAIN;
-                old.by_gain(parts)
+                old.gain_change(parts)
             };
             vec![gain(0), gain(1), gain(2)]
         };
         match self {
-            Self::Gain => vec![old.by_gain([GAIN; 3])],
+            Self::Gain => vec![old.gain_change([GAIN; 3])],
             Self::Gains => gains(),
             // What errors of the log's temperatures make of its gain.
-            Self::Temperature => vec![old.by_gain([OF_SENSORS; 3])],
+            Self::Temperature => vec![old.gain_change([OF_SENSORS; 3])],
             Self::All => {
                 let mut columns = gains();
                 for (probe, values) in old.probes.iter().enumerate() {
@@ -207,7 +207,7 @@ pub fn update(
     let posterior = Posterior::new(with_lag.clone(), &parameters, &noise);
     Ok(Update {
         posterior: match covariance.is_some_and(|covariance| covariance.nrows() > COUNT) {
-            true => posterior.with_warmth(&with_lag),
+            true => posterior.with_temperature(&with_lag),
             false => posterior,
         },
         parameters,
@@ -239,7 +239,7 @@ fn factor(
         let scaled = Cholesky::new(scaled)?.unpack();
         for i in 0..known {
             // k and h stand behind the lag.
-            let unknown = if i < COUNT { i } else { i + 1 };
+            let unknown = if i < LAG { i } else { i + 1 };
             for j in 0..=i {
                 l[(unknown, j)] = scale[i] * scaled[(i, j)];
             }
@@ -250,14 +250,14 @@ fn factor(
             l[(i, known + j)] = *value;
         }
     }
-    l[(COUNT, known + changes.len())] = LAG_S;
+    l[(LAG, known + changes.len())] = LAG_S;
     Some(l)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::field::sample_for_tests::{Run, parameters, stage};
+    use crate::estimator::sample_for_tests::{Run, parameters, stage};
 
     /// What a log of the changed stage gives, from the sample parameters known to a thousandth.
     fn updated(new: &FieldParameters, run: &Run, change: Change) -> (Update, FieldParameters) {

@@ -55,8 +55,8 @@ impl Probe {
 
     /// The gain at changes of temperature, K, over that which was expected.
     #[inline(always)]
-    pub fn gain(&self, warmth_k: [f64; 2]) -> f64 {
-        1.0 + (self.gain_per_k[0] * warmth_k[0] + self.gain_per_k[1] * warmth_k[1])
+    pub fn gain(&self, temperature_k: [f64; 2]) -> f64 {
+        1.0 + (self.gain_per_k[0] * temperature_k[0] + self.gain_per_k[1] * temperature_k[1])
     }
 
     /// The displacement read at the planar pose `planar_mm` (mm, mm, mrad) and the vertical pose
@@ -179,8 +179,8 @@ fn shape(p: &[f64; PER_PROBE], u: f64, w: f64, z: f64) -> ([f64; SHAPE], [f64; 3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::field::sample_for_tests::parameters;
-    use crate::solve::field::terms::TERMS;
+    use crate::estimator::sample_for_tests::parameters;
+    use crate::estimator::terms::TERMS;
     use runtime::matrix::to_rows;
 
     const PLANAR_MM: [f64; 3] = [0.31, -0.42, 0.23];

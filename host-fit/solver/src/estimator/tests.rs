@@ -1,15 +1,15 @@
 //! The whole fit on logs with known truth.
 
 use super::error::FieldFitError;
-use super::fit::{FieldFit, fit_field};
+use super::field::{FieldFit, fit_field};
 use super::parameters::{FieldParameters, HELD};
-use super::posterior::warmth_errors;
+use super::posterior::temperature_errors;
 use super::sample_for_tests::{Run, parameters, stage};
 use super::terms::{COUNT, name};
 use super::update::{Change, update};
-use crate::problem::Problem;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
+use crate::estimator::model::Model;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
 use crate::solve::{Projection, Solver, SolverOptions};
 use hallstage_input::dataset::{Dataset, LogSource, LoggedFrame};
 use hallstage_input::stage::Stage;
@@ -19,7 +19,7 @@ use runtime::{ModelKind, RawFrame, Temperature};
 
 fn model_31(dataset: &Dataset, all: &[usize], stage: &Stage) -> Parameters {
     let options = SolverOptions::new(Projection::Linear, 1);
-    let problem = Problem::new(dataset, all, stage, Model::of(ModelKind::M31));
+    let problem = Problem::new(dataset, all, stage, Model::from_kind(ModelKind::M31));
     Solver::LeastSquares
         .solve(&problem, &options)
         .expect("a fit")
@@ -55,10 +55,10 @@ fn eight_seconds_give_the_parameters_within_their_standard_errors() {
     assert!((0.3..2.0).contains(&mean_square), "{mean_square}");
     let chi_squared = fit.figures.score.chi_squared / fit.figures.score.residuals as f64;
     assert!((0.85..1.15).contains(&chi_squared), "{chi_squared}");
-    for ratio in fit.figures.verdict.service.ratios() {
+    for ratio in fit.figures.comparison.service.ratios() {
         assert!(ratio < 1.02, "{ratio}");
     }
-    assert!(fit.figures.verdict.field, "{}", fit.figures.verdict);
+    assert!(fit.figures.comparison.field, "{}", fit.figures.comparison);
     assert!(fit.iterations <= 8, "{}", fit.iterations);
 }
 
@@ -135,9 +135,9 @@ fn a_log_of_still_heights_cannot_carry_the_model() {
 
 #[test]
 fn a_stage_that_is_model_31_keeps_it() {
-    let truth = FieldParameters::of_model_31(&parameters().model_31(), &stage());
+    let truth = FieldParameters::from_model_31(&parameters().model_31(), &stage());
     let fit = fit(&Run::EIGHT_SECONDS.dataset(&truth)).expect("a fit");
-    assert!(!fit.figures.verdict.field, "{}", fit.figures.verdict);
+    assert!(!fit.figures.comparison.field, "{}", fit.figures.comparison);
 }
 
 /// Two runs, the second with a mount that is 5 K warmer. The magnets differ in k.
@@ -172,18 +172,24 @@ fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
 #[test]
 fn a_cold_and_a_warm_log_tell_k_within_its_standard_error() {
     let truth = [-0.9e-3, -1.3e-3, -1.6e-3];
-    let warmth = fit(&cold_and_warm(truth, 2)).expect("a fit").figures.warmth;
-    assert_eq!(warmth.temperature.zero_mc[0], 22_500);
+    let temperature = fit(&cold_and_warm(truth, 2))
+        .expect("a fit")
+        .figures
+        .temperature;
+    assert_eq!(temperature.temperature.zero_mc[0], 22_500);
     for (probe, truth) in truth.into_iter().enumerate() {
         // k counts from the gain at T0, 2.5 K above the cold log.
         let truth = truth / (1.0 + truth * 2.5);
-        let found = warmth.temperature.per_mk[probe][0] * 1e3;
-        let error = warmth.error_per_k[probe][0];
+        let found = temperature.temperature.per_mk[probe][0] * 1e3;
+        let error = temperature.error_per_k[probe][0];
         assert!(error < 6e-5, "{probe}: {error:e}");
         let off = (found - truth) / error;
         assert!(off.abs() < 3.5, "{probe}: {found:e} is {off} errors off");
     }
-    assert_eq!(warmth.temperature.reach_mk[1], 0, "there is no body sensor");
+    assert_eq!(
+        temperature.temperature.reach_mk[1], 0,
+        "there is no body sensor"
+    );
 }
 
 #[test]
@@ -196,9 +202,14 @@ fn logs_at_nearly_one_temperature_leave_k_as_expected() {
             *mount_mc = 20_000 + (*mount_mc - 20_000) / part;
         }
         dataset.compensate_as_expected(&stage().temperature);
-        let warmth = fit(&dataset).expect("a fit").figures.warmth;
-        assert_eq!(warmth.spans_k, [0.0; 2]);
-        for (per_mk, error) in warmth.temperature.per_mk.iter().zip(warmth.error_per_k) {
+        let temperature = fit(&dataset).expect("a fit").figures.temperature;
+        assert_eq!(temperature.spans_k, [0.0; 2]);
+        for (per_mk, error) in temperature
+            .temperature
+            .per_mk
+            .iter()
+            .zip(temperature.error_per_k)
+        {
             assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");
             assert_eq!(error[0], 3e-4);
         }
@@ -242,7 +253,7 @@ fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
         let what = Change::Temperature;
         let update = update(&dataset, &stage(), &old, Some(&known), what, drift_mm);
         let update = update.expect("an update");
-        let found = warmth_errors(&update.posterior.covariance).expect("k and h");
+        let found = temperature_errors(&update.posterior.covariance).expect("k and h");
         for probe in 0..3 {
             assert!(
                 found[probe][0] < 0.9 * errors[probe][0],

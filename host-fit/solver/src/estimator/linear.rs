@@ -1,7 +1,7 @@
 //! The linear form of Model (31): pose = G s / (1 + r v), with the gain G = PM^-1 diag(1/eta) an
 //! arbitrary matrix and r the slopes over eta.
 
-use crate::problem::parameters::Parameters;
+use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::geometry::SensingAxes;

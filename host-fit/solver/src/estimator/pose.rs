@@ -5,14 +5,14 @@
 //! model reads exactly the signal, so that reference less q is the error of the pose, and -T times the
 //! derivatives of the reading there are the exact derivatives of q.
 
-use super::blocks::FieldRow;
 use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
+use super::rows::FieldRow;
 use super::terms::CARRY;
-use crate::problem::Problem;
-use crate::problem::model::COUNT;
-use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::gauss_newton::{Equations, Normal, Point};
+use crate::estimator::model::COUNT;
+use crate::estimator::paper::Parameters;
+use crate::estimator::problem::Problem;
 use hallstage_input::stage::Stage;
 use runtime::matrix::{inverse, to_rows};
 use std::ops::Range;
@@ -57,7 +57,7 @@ impl Decoder {
         let is_regular = eta.iter().all(|eta| eta.is_normal());
         let inverse = inverse(&parameters.geometry().plane())?;
         is_regular.then_some(Self {
-            probes: probes(&FieldParameters::of_model_31(parameters, stage)),
+            probes: probes(&FieldParameters::from_model_31(parameters, stage)),
             eta,
             slopes: parameters.slopes(),
             inverse: to_rows(&(inverse * 1e3)),
@@ -149,7 +149,7 @@ impl Equations<COLUMNS> for Problem<'_> {
     fn normal(&self, at: &Point) -> Option<Normal<COLUMNS>> {
         let decoder = Decoder::new(&Parameters::from_slice(at.values.as_slice()), self.stage)?;
         let movements = self.movement_rows();
-        Normal::of_movements(movements.len(), |movement| {
+        Normal::sum(movements.len(), |movement| {
             let rows = &self.rows.rows[movements[movement].clone()];
             let mut normal = Normal::none();
             // About the first row, near which the mean is, and then about the mean.

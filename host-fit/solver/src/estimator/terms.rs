@@ -1,5 +1,6 @@
 //! The 81 parameters of the field model: names, units, order and prior.
 
+use super::temperature::Coefficient;
 use runtime::model::Shape;
 
 /// Parameters of one probe.
@@ -98,8 +99,8 @@ pub fn name(index: usize) -> String {
 
 /// The names of the rows of a covariance: all parameters, then (k, h) of A, B, C if it has more rows.
 pub fn names(rows: usize) -> Vec<String> {
-    let warmth = ["k_a", "h_a", "k_b", "h_b", "k_c", "h_c"].map(str::to_owned);
-    (0..COUNT).map(name).chain(warmth).take(rows).collect()
+    let temperature = Coefficient::ALL.map(Coefficient::name);
+    (0..COUNT).map(name).chain(temperature).take(rows).collect()
 }
 
 /// The coefficients of p, in the order of [`TERMS`], where the decoder has them.

@@ -1,11 +1,11 @@
 //! The posterior of a log that is not recorded yet: it does not depend on the residuals.
 
-use super::blocks::Rows;
-use super::carry::{Service, ServiceVariance, service_poses};
 use super::parameters::{FieldParameters, HELD, unknowns};
-use super::posterior::{Posterior, covariance_at, warmth_errors};
+use super::posterior::{Posterior, covariance_at, temperature_errors};
 use super::probe::probes;
-use super::warmth::Sensors;
+use super::rows::Rows;
+use super::service::{Service, ServiceVariance, service_poses};
+use super::temperature::Sensors;
 use super::whiten::{FieldEquations, Noise};
 use nalgebra::DMatrix;
 
@@ -20,7 +20,7 @@ pub struct Forecast {
 
 /// What is to be expected of logs at several temperatures.
 #[derive(Clone, Debug)]
-pub struct WarmForecast {
+pub struct TemperatureForecast {
     /// Standard errors of (k, h) of A, B, C, 1/K.
     pub error_per_k: [[f64; 2]; 3],
     /// Errors in service over the noise floor at each distance, X, Y, Rz.
@@ -61,13 +61,13 @@ impl Forecaster {
     }
 
     /// The same for logs at several temperatures, at distances (mount, body) from T0, K.
-    pub fn forecast_warm(
+    pub fn forecast_temperatures(
         &self,
         rows: &Rows,
         weight: f64,
         sensors: &Sensors,
         distances_k: &[[f64; 2]],
-    ) -> Option<WarmForecast> {
+    ) -> Option<TemperatureForecast> {
         let mut covariance = self.covariance(rows, weight, sensors.deviations())?;
         let amplitude_mm = rows.rows.iter().map(|row| row.reference_mm[1].abs());
         let white_mm = self.noise.white_mm[1];
@@ -75,18 +75,18 @@ impl Forecaster {
         let rms_to_noise = amplitude_mm.fold(0.0, f64::max) / (f64::sqrt(2.0) * white_mm);
         sensors.complete(&mut covariance, rms_to_noise * rms_to_noise);
         let posterior = Posterior::new(covariance.clone(), &self.parameters, &self.noise);
-        let posterior = posterior.with_warmth(&covariance);
+        let posterior = posterior.with_temperature(&covariance);
         let ratios = distances_k.iter().map(|distance_k| {
             let there = covariance_at(&posterior.covariance, &self.parameters, *distance_k);
             self.service.variance(&there).ratios()
         });
-        Some(WarmForecast {
-            error_per_k: warmth_errors(&posterior.covariance)?,
+        Some(TemperatureForecast {
+            error_per_k: temperature_errors(&posterior.covariance)?,
             ratios: ratios.collect(),
         })
     }
 
-    fn covariance(&self, rows: &Rows, weight: f64, warmth: [f64; 2]) -> Option<DMatrix<f64>> {
+    fn covariance(&self, rows: &Rows, weight: f64, temperature: [f64; 2]) -> Option<DMatrix<f64>> {
         let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
         let mut blocks = rows.evaluate(&probes(&self.parameters), 0.0, &offsets_mm);
         blocks.iter_mut().for_each(|block| block.rows *= weight);
@@ -98,6 +98,6 @@ impl Forecaster {
             resets_mm: None,
             faults: &[],
         };
-        unknowns(&places, warmth).covariance(&equations.of_blocks(&blocks))
+        unknowns(&places, temperature).covariance(&equations.sum_blocks(&blocks))
     }
 }

@@ -2,15 +2,70 @@
 //! temperature sensors leave.
 
 use super::parameters::HELD;
+use super::terms::COUNT;
+use super::whiten::LAG;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use runtime::Temperature;
 use std::ops::Range;
 
+/// A coefficient of temperature: k (sensor 0, of the mount) or h (sensor 1, of the body) of a probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coefficient {
+    /// The probe, 0 to 2 for A to C.
+    pub probe: usize,
+    /// The sensor.
+    pub sensor: usize,
+}
+
+impl Coefficient {
+    /// (k, h) of A, B and C, in the order of every list and matrix.
+    pub const ALL: [Self; 6] = [
+        Self::new(0, 0),
+        Self::new(0, 1),
+        Self::new(1, 0),
+        Self::new(1, 1),
+        Self::new(2, 0),
+        Self::new(2, 1),
+    ];
+
+    /// Rows of the covariance of a posterior with k and h.
+    pub const ROWS: usize = COUNT + Self::ALL.len();
+
+    /// Of a probe and a sensor.
+    pub const fn new(probe: usize, sensor: usize) -> Self {
+        Self { probe, sensor }
+    }
+
+    /// Its place among the six.
+    const fn place(self) -> usize {
+        2 * self.probe + self.sensor
+    }
+
+    /// Its row in the covariance of a posterior.
+    pub const fn row(self) -> usize {
+        COUNT + self.place()
+    }
+
+    /// Its place among the unknowns of a fit.
+    pub const fn unknown(self) -> usize {
+        LAG + 1 + self.place()
+    }
+
+    /// Its name, for instance `k_a`.
+    pub fn name(self) -> String {
+        format!(
+            "{}_{}",
+            ["k", "h"][self.sensor],
+            ["a", "b", "c"][self.probe]
+        )
+    }
+}
+
 /// k and h as a fit found them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Warmth {
+pub struct TemperatureFit {
     /// k, h and T0.
     pub temperature: Temperature<f64>,
     /// Standard errors of (k, h) of A, B, C, 1/K; from the prior where the log does not determine them.
@@ -36,7 +91,7 @@ const OF_FORM_TOGETHER: f64 = 1.3e-5;
 pub struct Sensors {
     /// Whether mount and body have one.
     pub is_there: [bool; 2],
-    /// See [`Warmth::spans_k`].
+    /// See [`TemperatureFit::spans_k`].
     pub spans_k: [f64; 2],
     /// Rows and mean changes of temperature from T0, K, of each log; of one alone, of its halves.
     pub by_log: Vec<(f64, [f64; 2])>,
@@ -65,8 +120,9 @@ impl Sensors {
     }
 
     /// Completes the covariance of k and h, the last rows of a fit's covariance. It adds the errors of the sensors (one
-    /// for each log, the same for all probes) and of the form, and takes the prior where they were held in the fit. The gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
-    /// square of a row's signal over its noise.
+    /// for each log, the same for all probes) and of the form, and takes the prior where they were held in the fit. The gain of a
+    /// log follows 1, dM and dH, and is known by its rows: `signal_to_noise` is the mean square of a row's signal over
+    /// its noise.
     pub(super) fn complete(&self, covariance: &mut DMatrix<f64>, signal_to_noise: f64) {
         let along = |change_k: [f64; 2]| Vector3::new(1.0, change_k[0], change_k[1]);
         let [k, h] = self
@@ -83,15 +139,14 @@ impl Sensors {
             let error = inverse * along(*change_k) * (rows * signal_to_noise * OF_SENSORS);
             of_sensors += error * error.transpose();
         }
-        let (first, end) = (covariance.nrows() - 6, covariance.nrows());
-        for i in first..end {
-            for j in first..end {
-                covariance[(i, j)] += of_sensors[(1 + (i - first) % 2, 1 + (j - first) % 2)];
+        let first = covariance.nrows() - Coefficient::ALL.len();
+        for coefficient in Coefficient::ALL {
+            let (i, sensor) = (first + coefficient.place(), coefficient.sensor);
+            for other in Coefficient::ALL {
+                let j = first + other.place();
+                covariance[(i, j)] += of_sensors[(1 + sensor, 1 + other.sensor)];
             }
-            let (sensor, other) = (
-                (i - first) % 2,
-                first + (i - first) / 2 * 2 + (i + 1 - first) % 2,
-            );
+            let other = first + Coefficient::new(coefficient.probe, 1 - sensor).place();
             let together = OF_FORM_TOGETHER * OF_FORM_TOGETHER;
             match [sensor, 1 - sensor].map(|sensor| self.spans_k[sensor] > 0.0) {
                 [true, true] => {
