@@ -79,7 +79,7 @@ fn an_age_costs_what_the_readme_says_and_a_prediction_takes_it_back() {
         let run = protocol.run(stage.servo_period_s, SEED);
         record(&stage, &assembly, run, &SensorErrors::USUAL, SEED).expect("within the gaps")
     };
-    let field = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::Field)));
+    let field = FitSettings::new(ModelChoice::Named(Model::from_kind(ModelKind::Field)));
     let log = recorded(Protocol::Combined)
         .dataset(&stage)
         .expect("a sound stage");
