@@ -1,5 +1,5 @@
-//! Poses from a recorded bus: reads a parameter blob and a `candump -L` log of a stage whose
-//! sensor node sends 16-bit codes, and prints one line per tick.
+//! Poses from a recorded bus: reads a parameter blob and a `candump -L` log with 16-bit codes, and prints one
+//! line per tick.
 //!
 //! ```sh
 //! cargo run -p hal-adapters --example decode_candump -- hal-adapters/examples/data/params.bin hal-adapters/examples/data/bus.log

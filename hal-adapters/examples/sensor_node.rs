@@ -30,7 +30,7 @@ fn main() -> Result<(), AdcError<Infallible>> {
     })
 }
 
-/// Samples and sends so many ticks, once the converter's reference has settled.
+/// Samples and sends this number of ticks, once the converter's reference has settled.
 fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<Infallible>> {
     let mut converter = Ads8688::new(Part::default(), Pin, Channels::IN_ORDER);
     let mut temperatures = TemperatureSender::START;
@@ -45,7 +45,7 @@ fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<I
             Err(AdcError::NotReady { .. }) if sequence < settled => continue,
             sampled => sampled?,
         };
-        // None here: its `Channels` have no thermometers.
+        // These `Channels` have no thermometers, so there is no such frame.
         let temperatures = temperatures.frame(&frame).into_iter();
         for coded in temperatures.chain(sensor::frames(Layout::Bits16, &frame)) {
             // On a controller: `coded.to_frame()` gives the frame type of its driver.
@@ -55,7 +55,7 @@ fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<I
     Ok(())
 }
 
-/// An ADS8688 whose input k has the code 100 * k, in software.
+/// A simulated ADS8688 with the code 100 * k at input k.
 #[derive(Default)]
 struct Part {
     registers: [u8; 32],

@@ -23,32 +23,16 @@ pub struct LogLine<'l> {
     pub frame: BusFrame,
 }
 
-/// What is wrong with a line. Columns count characters from 1.
+/// Why a line is no data frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineError {
-    /// The line does not start with `(seconds.microseconds)`.
-    #[error("no time: a line starts with (seconds.microseconds)")]
-    BadTime,
-    /// The interface or the frame is missing: the line is cut short.
-    #[error("cut short: time, interface and frame belong here")]
-    CutShort,
-    /// Neither three nor eight hexadecimal digits, or a value beyond 11 or 29 bits.
-    #[error("column {column}: an identifier has three or eight hexadecimal digits")]
-    BadIdentifier {
-        /// Where the identifier starts.
+    /// The line breaks a rule of the format.
+    #[error("column {column}: {rule}")]
+    Malformed {
+        /// Where, in characters from 1.
         column: usize,
-    },
-    /// No `#` after the identifier.
-    #[error("column {column}: `#` belongs after the identifier")]
-    NoSeparator {
-        /// Where it should be.
-        column: usize,
-    },
-    /// Not pairs of hexadecimal digits, or more than eight.
-    #[error("column {column}: data are up to eight pairs of hexadecimal digits")]
-    BadData {
-        /// Where the data start.
-        column: usize,
+        /// The rule.
+        rule: &'static str,
     },
     /// A frame of CAN FD: this protocol is classic CAN.
     #[error("a frame of CAN FD, where classic CAN belongs")]
@@ -56,13 +40,12 @@ pub enum LineError {
     /// An error frame of the controller, not a frame of the bus.
     #[error("an error frame of the controller")]
     ErrorFrame,
-    /// Something follows the frame.
-    #[error("column {column}: nothing belongs here")]
-    Trailing {
-        /// Where it starts.
-        column: usize,
-    },
 }
+
+const TIME: &str = "a line starts with (seconds.microseconds)";
+const PARTS: &str = "a line has a time, an interface and a frame";
+const IDENTIFIER: &str = "an identifier has three or eight hexadecimal digits, and `#` follows";
+const DATA: &str = "data are up to eight pairs of hexadecimal digits";
 
 /// Bit of a logged identifier that marks an error frame.
 const ERROR_FLAG: u32 = 0x2000_0000;
@@ -73,30 +56,27 @@ impl<'l> LogLine<'l> {
     /// # Errors
     /// [`LineError`]. `ErrorFrame` and `FlexibleDataRate` are correct lines of another kind.
     pub fn parse(line: &'l str) -> Result<Self, LineError> {
-        let column_of = |part: &str| part.as_ptr() as usize - line.as_ptr() as usize + 1;
+        let broken = |rest: &str, rule| LineError::Malformed {
+            column: rest.as_ptr() as usize - line.as_ptr() as usize + 1,
+            rule,
+        };
+        let end = line.get(line.len()..).unwrap_or_default();
         let mut parts = line.split_ascii_whitespace();
-        let time_us = parts
-            .next()
-            .and_then(parse_time)
-            .ok_or(LineError::BadTime)?;
-        let interface = parts.next().ok_or(LineError::CutShort)?;
-        let text = parts.next().ok_or(LineError::CutShort)?;
-        let column = column_of(text);
+        let time_us = parts.next().and_then(parse_time);
+        let time_us = time_us.ok_or_else(|| broken(line, TIME))?;
+        let (Some(interface), Some(text)) = (parts.next(), parts.next()) else {
+            return Err(broken(end, PARTS));
+        };
         // A fourth part, R or T, is the direction (candump -x).
-        let rest = parts.find(|part| !matches!(*part, "R" | "T"));
-        if let Some(rest) = rest {
-            let column = column_of(rest);
-            return Err(LineError::Trailing { column });
+        if let Some(rest) = parts.find(|part| !matches!(*part, "R" | "T")) {
+            return Err(broken(rest, PARTS));
         }
-        let (id, data) = text.split_once('#').ok_or(LineError::NoSeparator {
-            column: column + text.len(),
-        })?;
+        let (id, data) = (text.split_once('#')).ok_or_else(|| broken(text, IDENTIFIER))?;
         if data.starts_with('#') {
             return Err(LineError::FlexibleDataRate);
         }
-        let id = parse_id(id).ok_or(LineError::BadIdentifier { column })??;
-        let column = column_of(data);
-        let frame = parse_data(id, data).ok_or(LineError::BadData { column })?;
+        let id = parse_id(id).ok_or_else(|| broken(text, IDENTIFIER))??;
+        let frame = parse_data(id, data).ok_or_else(|| broken(data, DATA))?;
         Ok(Self {
             time_us,
             interface,
@@ -124,7 +104,7 @@ fn parse_time(text: &str) -> Option<u64> {
     seconds.checked_mul(1_000_000)?.checked_add(micros)
 }
 
-/// `None` if this is no identifier, an error if it is that of an error frame.
+/// `None` if this is no identifier, an error for the identifier of an error frame.
 fn parse_id(text: &str) -> Option<Result<Id, LineError>> {
     if !text.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
@@ -193,29 +173,29 @@ mod tests {
 
     #[test]
     fn each_broken_line_has_its_own_reason() {
-        use LineError as E;
+        let broken = |column, rule| LineError::Malformed { column, rule };
         for (line, error) in [
-            ("", E::BadTime),
-            ("1735270496.916858 can0 110#00", E::BadTime),
-            ("(1735270496.9168) can0 110#00", E::BadTime),
-            ("(+1.000000) can0 110#00", E::BadTime),
-            ("(99999999999999999999.000000) can0 110#00", E::BadTime),
-            ("(1.000000)", E::CutShort),
-            ("(1.000000) can0", E::CutShort),
-            ("(1.000000) can0 110", E::NoSeparator { column: 20 }),
-            ("(1.000000) can0 11#00", E::BadIdentifier { column: 17 }),
-            ("(1.000000) can0 800#00", E::BadIdentifier { column: 17 }),
-            ("(1.000000) can0 +10#00", E::BadIdentifier { column: 17 }),
-            ("(1.000000) can0 110#0", E::BadData { column: 21 }),
-            ("(1.000000) can0 110#0g", E::BadData { column: 21 }),
+            ("", broken(1, TIME)),
+            ("1735270496.916858 can0 110#00", broken(1, TIME)),
+            ("(1735270496.9168) can0 110#00", broken(1, TIME)),
+            ("(+1.000000) can0 110#00", broken(1, TIME)),
+            ("(99999999999999999999.000000) can0 110#00", broken(1, TIME)),
+            ("(1.000000)", broken(11, PARTS)),
+            ("(1.000000) can0", broken(16, PARTS)),
+            ("(1.000000) can0 110", broken(17, IDENTIFIER)),
+            ("(1.000000) can0 11#00", broken(17, IDENTIFIER)),
+            ("(1.000000) can0 800#00", broken(17, IDENTIFIER)),
+            ("(1.000000) can0 +10#00", broken(17, IDENTIFIER)),
+            ("(1.000000) can0 110#0", broken(21, DATA)),
+            ("(1.000000) can0 110#0g", broken(21, DATA)),
+            ("(1.000000) can0 110#001122334455667788", broken(21, DATA)),
+            ("(1.000000) can0 110#R9", broken(21, DATA)),
+            ("(1.000000) can0 110##100", LineError::FlexibleDataRate),
             (
-                "(1.000000) can0 110#001122334455667788",
-                E::BadData { column: 21 },
+                "(1.000000) can0 20000004#000C000000000000",
+                LineError::ErrorFrame,
             ),
-            ("(1.000000) can0 110#R9", E::BadData { column: 21 }),
-            ("(1.000000) can0 110##100", E::FlexibleDataRate),
-            ("(1.000000) can0 20000004#000C000000000000", E::ErrorFrame),
-            ("(1.000000) can0 110#00 x", E::Trailing { column: 24 }),
+            ("(1.000000) can0 110#00 x", broken(24, PARTS)),
         ] {
             assert_eq!(LogLine::parse(line), Err(error), "{line}");
         }

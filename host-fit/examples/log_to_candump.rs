@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (hall, gaps) = (stage.hall.window, stage.capacitive.window);
     let (low, high) = (hall.low.min(gaps.low), hall.high.max(gaps.high));
     // The rails beyond the window are sent too.
-    let layout = Layout::that_holds(low - 1, high + 1).ok_or("codes of more than 24 bits")?;
+    let layout = Layout::from_range(low - 1, high + 1).ok_or("codes of more than 24 bits")?;
     let mut rows = LogRows::open(Path::new(log), "reading", &stage, &ReadOptions::DECODE)?;
     let period_us = rows.period_us() as u32;
     let mut temperatures = TemperatureSender::START;

@@ -1,5 +1,4 @@
-//! Bus frames dropped, repeated, delayed and damaged on the way: for tests of whatever receives
-//! them. The same seed gives the same faults.
+//! Drops, repeats, delays and damages bus frames, for tests of receivers. The same seed gives the same faults.
 //!
 //! ```
 //! use embedded_can::Frame;
@@ -17,16 +16,16 @@ use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::table::TABLE;
 use hal_adapters::can::{BusFrame, Message};
 
-/// What can happen to a frame.
+/// A fault of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It does not come.
+    /// It is lost.
     Drop,
-    /// It comes twice.
+    /// It arrives twice.
     Repeat,
-    /// It comes after some of the next frames.
+    /// It arrives after some of the next frames.
     Swap,
-    /// It comes some ticks later.
+    /// It arrives some ticks late.
     Delay,
     /// One to three of its bits are flipped.
     Flip,
@@ -41,7 +40,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Every one.
+    /// All faults.
     pub const ALL: [Self; 9] = [
         Self::Drop,
         Self::Repeat,
@@ -96,7 +95,7 @@ pub fn damaged(frame: &BusFrame, fault: Fault, random: &mut Random) -> BusFrame 
     }
 }
 
-/// The same frame with its bytes XOR `mask`, whose most significant byte falls on byte 0.
+/// The same frame with its bytes XOR `mask`; the most significant byte of `mask` falls on byte 0.
 pub fn flipped(frame: &BusFrame, mask: u64) -> BusFrame {
     let mut data = [0; 8];
     for (to, (from, mask)) in data

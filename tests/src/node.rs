@@ -1,6 +1,6 @@
 //! The stage controller on this machine: the firmware's own start, node, records and outbox, over
-//! two sectors of flash in RAM. In place of the chip there are a clock that others advance, codes
-//! that are made up, and random numbers by a seed.
+//! two sectors of flash in RAM. The clock is advanced by the caller, the codes are made up, and the random numbers
+//! follow from a seed.
 
 use crate::flash_model::FlashModel;
 use crate::random::Random;
@@ -29,7 +29,7 @@ pub struct Node {
     records: Records<FlashModel>,
     // Below what borrows from it: fields are dropped in this order.
     statics: Statics,
-    /// What a reset leaves in RAM.
+    /// RAM that survives a reset.
     retained: [u32; WORDS],
     outbox: Outbox,
     random: Random,
@@ -61,8 +61,8 @@ impl Node {
         }
     }
 
-    /// One tick, of which so many before it were missed: decodes codes, takes frames of the bus,
-    /// and stores an update. Says whether it did: that takes half a second.
+    /// One tick after `missed_ticks` missed ticks: decodes codes, takes frames of the bus, and stores an update.
+    /// Returns whether it stored one, which takes half a second.
     pub fn tick(
         &mut self,
         missed_ticks: u32,
@@ -107,8 +107,7 @@ impl Node {
         self.ticking.wants_reset() && self.outbox.is_empty()
     }
 
-    /// A reset, which may be the one that it waits for: flash and retained RAM are kept, and all else is
-    /// as the start-up makes it.
+    /// A reset: flash and retained RAM are kept.
     pub fn reset(&mut self) {
         if self.ticking.wants_reset() {
             let mut record = Retained::from_words(&self.retained).unwrap_or_default();
@@ -183,20 +182,20 @@ impl Node {
     }
 }
 
-/// What the controller has as statics, for one start.
+/// The statics of the controller, for one start.
 struct Statics {
     place: NonNull<MaybeUninit<Loaded>>,
 }
 
 impl Drop for Statics {
     fn drop(&mut self) {
-        // SAFETY: it is a box of `start`, which gave its only reference to the node and the records
-        // that it made. `Node` drops or replaces those first, and hands out neither.
+        // SAFETY: it is a box of `start`, which gave its only reference to the node and the records. `Node` drops or
+        // replaces both first, and hands out neither.
         drop(unsafe { Box::from_raw(self.place.as_ptr()) });
     }
 }
 
-/// What the firmware's `init` does, without what concerns the chip.
+/// The firmware's `init` without the chip.
 fn start(
     flash: FlashModel,
     (serial, key): (Option<&'static str>, Option<Key>),
@@ -224,7 +223,7 @@ fn start(
     (node, records, statics)
 }
 
-/// What is in RAM once it runs.
+/// RAM that survives a reset, once the node runs.
 fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_>) -> [u32; WORDS] {
     let mut record = before.record;
     if let Some(running) = records.running() {

@@ -9,7 +9,7 @@ use crate::listing::{Instruction, Listing};
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-/// What the calls of one function took.
+/// The cost of the calls of one function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Calls.
@@ -20,7 +20,9 @@ pub struct Counts {
     pub most: u64,
     /// Most divisions of a call.
     pub divisions: u64,
-    /// Instructions outside the function itself, over all calls: those of its callees.
+    /// Most cycles of a call, estimated: see [`Instruction::cycles`].
+    pub cycles: u64,
+    /// Instructions of the function's callees, over all calls.
     pub in_callees: u64,
 }
 

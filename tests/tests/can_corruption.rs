@@ -1,5 +1,4 @@
-//! Damaged frames of the bus never become a pose that is called valid: a million,
-//! through coder, damage, receiver and decoder.
+//! A million damaged frames through coder, damage, receiver and decoder: none becomes a valid pose.
 
 use hal_adapters::can::{BusFrame, Layout, SensorReceiver, Timing, sensor};
 use runtime::{AnyDecoder, Decode, ParameterSet, PlanarPose, RawFrame, Status};
@@ -11,7 +10,7 @@ fn decoder() -> AnyDecoder {
     ParameterSet::from_bytes(blob).expect("sound").decoder()
 }
 
-/// A tick whose six codes tell its number and where they belong.
+/// A tick with its number and their own places in its six codes.
 fn tick(n: u32) -> RawFrame {
     let part = |shift: u32, channel: i32| ((n >> shift & 0xfff) as i32) * 8 + channel - 16_384;
     RawFrame::new(

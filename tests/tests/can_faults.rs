@@ -92,7 +92,7 @@ fn with_fault(
             frames[next].frame = a;
         }
         Fault::Delay => {
-            // Beyond the time in which a tick is collected, from its first frame that comes.
+            // Later than a tick is collected, from the arrival of its first frame.
             let late = 1_000 + 3 * FRAME_US + random.below(9 * PERIOD_US);
             frames[at].time_us += late;
             frames.sort_by_key(|f| f.time_us);

@@ -1,5 +1,4 @@
-//! What the age of a pose costs in service, and what is left of it after a prediction: the
-//! figures of the runtime's README.
+//! The errors in service of a pose with an age, raw and predicted: the figures of the runtime's README.
 
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::shipped;
@@ -14,7 +13,7 @@ use runtime::{ModelKind, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFra
 const SEED: u64 = 2;
 const PERIOD_US: u32 = 2_000;
 
-/// Age (us), rms error of X, Y, Rz (um, um, urad) as they are, and predicted.
+/// Age (us), rms error of X, Y, Rz (um, um, urad), raw and predicted.
 const DOCUMENTED: [(u32, [f64; 3], [f64; 3]); 6] = [
     (0, [1.08, 0.44, 2.47], [1.08, 0.44, 2.47]),
     (150, [1.09, 0.55, 2.48], [1.08, 0.44, 2.49]),
@@ -24,8 +23,8 @@ const DOCUMENTED: [(u32, [f64; 3], [f64; 3]); 6] = [
     (2_000, [2.70, 4.50, 3.44], [1.18, 0.58, 2.70]),
 ];
 
-/// Where the stage was at an age after a sample, by the cubic through the sample before it and the
-/// two after: they are 2 ms apart, and the motion is slow.
+/// The pose of the stage at an age after a sample, by the cubic through the sample before and the two after: they
+/// are 2 ms apart, and the motion is slow.
 fn truth_at(truth: &[[f64; 3]], sample: usize, age_us: u32) -> [f64; 3] {
     let x = f64::from(age_us) / f64::from(PERIOD_US);
     let weights = [
@@ -40,8 +39,7 @@ fn truth_at(truth: &[[f64; 3]], sample: usize, age_us: u32) -> [f64; 3] {
     })
 }
 
-/// Adds the squared errors of a movement's poses at an age, as they are and predicted; gives how
-/// many there are.
+/// Adds the squared errors of a movement's poses at an age, raw and predicted; gives their number.
 fn add_squares(
     set: &ParameterSet,
     samples: &[Sample],
@@ -72,7 +70,7 @@ fn add_squares(
 }
 
 #[test]
-fn an_age_costs_what_the_readme_says_and_a_prediction_takes_it_back() {
+fn the_errors_of_an_age_are_those_of_the_readme_raw_and_predicted() {
     let stage = shipped::stage();
     let assembly = Assembly::draw(&stage, SEED);
     let recorded = |protocol: Protocol| -> Recording {

@@ -57,7 +57,7 @@ pub struct Command {
     pub request: Option<Request>,
     /// Number of the command in the frame, 0 to 15.
     pub number: u8,
-    /// Chosen by the sender, a new one each time; the requests of one transfer share theirs.
+    /// Chosen by the sender anew each time; all requests of one transfer have the same token.
     pub token: u8,
 }
 
@@ -165,7 +165,7 @@ numbered! {
         BadContent = 13,
         /// The sequence number is not the next one; the detail is the next one.
         WrongSequence = 14,
-        /// The supply is too low to write. Nothing was written.
+        /// The supply is too low to write, and the store is unchanged.
         SupplyLow = 15,
         /// Words are missing; the detail is the index of the first.
         Incomplete = 16,

@@ -121,7 +121,7 @@ pub enum Verdict {
     First,
     /// The counter follows the last one: used.
     Next,
-    /// So many frames are missing before this one: used.
+    /// Frames are missing before this frame: used.
     Lost {
         /// Missing frames, 1 to [`LOST_MAX`].
         frames: u8,

@@ -47,8 +47,8 @@ proptest! {
     }
 }
 
-/// Every pattern of one to three flipped bits and every burst of up to eight, as masks over
-/// the 64 data bits in the order in which they are sent.
+/// Every pattern of one to three flipped bits and every burst of up to eight, as masks over the 64 data bits in
+/// their order on the bus.
 pub(crate) fn small_patterns() -> impl Iterator<Item = u64> {
     let bit = |k: u32| 1u64 << k;
     let flips = (0..64).flat_map(move |i| {

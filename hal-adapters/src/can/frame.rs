@@ -149,7 +149,7 @@ mod tests {
     const ID: StandardId = StandardId::MAX;
 
     impl BusFrame {
-        /// The same frame with its bytes XOR `mask`, whose most significant byte falls on byte 0.
+        /// The same frame with its bytes XOR `mask`; the most significant byte of `mask` falls on byte 0.
         pub(crate) fn flipped(&self, mask: u64) -> Self {
             let bytes = (u64::from_be_bytes(self.bytes) ^ mask).to_be_bytes();
             Self { bytes, ..*self }

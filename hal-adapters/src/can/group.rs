@@ -55,7 +55,7 @@ enum Silence {
 #[derive(Clone, Debug)]
 pub(super) struct Group {
     timing: Timing,
-    /// [`GroupTick::missing`] of a tick of which no frame came.
+    /// [`GroupTick::missing`] of a tick without frames.
     all_missing: u32,
     sequences: [Sequence; MESSAGES_MAX],
     is_started: bool,
@@ -106,7 +106,7 @@ impl Group {
         matches!(self.silence, Silence::Stale)
     }
 
-    /// The tick whose number ends in `counter` and is nearest to the newest one.
+    /// The tick nearest to the newest tick with a number that ends in `counter`.
     #[inline(always)]
     pub(super) const fn nearest(&self, counter: u8) -> u32 {
         if !self.is_started {
@@ -290,7 +290,7 @@ impl Group {
         self.over = self.pending;
     }
 
-    /// What the passing of time brings: a tick whose time is over, a source that is stale.
+    /// Lets time pass: gives an overdue tick, and reports a stale source.
     pub(super) fn poll(&mut self, now_us: u32) -> Taken<&GroupTick> {
         let mut fault = None;
         if let Silence::Since(last) = self.silence

@@ -28,23 +28,19 @@ macro_rules! numbered {
 }
 
 pub mod command;
-#[cfg(test)]
-mod dbc_tests;
 pub mod e2e;
 pub mod frame;
 mod group;
-#[cfg(test)]
-mod load_tests;
 pub mod node_number;
 pub mod notice;
 pub mod pose;
+#[cfg(test)]
+mod protocol_tests;
 pub mod receiver;
 pub mod sensor;
 pub mod service;
 pub mod status;
 pub mod table;
-#[cfg(test)]
-mod tables_tests;
 pub mod update;
 
 pub use frame::{BusFrame, Coded, StampedFrame};

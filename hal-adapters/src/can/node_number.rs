@@ -1,4 +1,4 @@
-//! Several stages on one bus, and a stage that leaves all standard identifiers to others.
+//! Several stages on one bus, or a stage beside other protocols with standard identifiers.
 //!
 //! The frames of the table belong to node 0 of a bus. Another node has extended identifiers: the eleven
 //! bits of the table first, so the priorities stay, then the node's number. Data, check and counter are the
@@ -21,7 +21,7 @@ use super::frame::BusFrame;
 use super::table::Message;
 use embedded_can::{ExtendedId, Id, StandardId};
 
-/// Bits of an extended identifier below those of a standard one.
+/// Bits that an extended identifier has below the bits of a standard identifier.
 const LOW_BITS: u32 = 18;
 
 /// The stage's number on the bus. The default, 0, has the standard identifiers of the table.
@@ -68,7 +68,7 @@ impl NodeNumber {
         }
     }
 
-    /// The frame of the table, if this node sent it. Node 0 takes every frame as it is.
+    /// The frame of the table, if this node sent it. Node 0 takes every frame unchanged.
     pub fn from_bus(self, frame: &BusFrame) -> Option<BusFrame> {
         match frame.id {
             _ if self.0 == 0 => Some(*frame),

@@ -54,7 +54,7 @@ pub enum BusFault {
         /// Distance to the last used counter, modulo 16.
         ahead: u8,
     },
-    /// Frames are missing before this one, which is used.
+    /// Frames are missing before this frame. This frame is used.
     #[error("{}: {frames} lost", message.name())]
     Lost {
         /// Which message.
@@ -109,7 +109,7 @@ pub struct BusHealth {
     pub good: u32,
     /// Frames of a wrong length.
     pub wrong_length: u32,
-    /// Frames whose check failed.
+    /// Frames with a failed check.
     pub wrong_check: u32,
     /// Repeated frames.
     pub repeated: u32,
@@ -126,7 +126,7 @@ pub struct BusHealth {
 }
 
 impl BusHealth {
-    /// Nothing counted yet.
+    /// All counters at zero.
     pub(super) const NONE: Self = Self {
         good: 0,
         wrong_length: 0,

@@ -165,7 +165,7 @@ pub struct ReceivedAxis {
     pub time_us: u32,
 }
 
-/// A tick whose time is known.
+/// A tick with a known time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Dated {
     /// Number of the tick, counted by the receiver.

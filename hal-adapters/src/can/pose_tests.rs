@@ -120,8 +120,8 @@ fn poses_between_two_time_frames_are_dated_by_their_numbers() {
     assert_eq!(undated, 8);
 }
 
-/// A host that loses frames: the counters of 15 to 18 ticks look like 0 to 2, and a time frame may
-/// come whose poses were lost.
+/// A host that loses frames: the counters of 15 to 18 ticks look like 0 to 2, and a time frame may arrive after
+/// its poses were lost.
 #[test]
 fn a_pose_after_any_loss_has_its_own_time_or_none() {
     for lost in 0..100u16 {
@@ -157,21 +157,6 @@ fn a_pose_after_any_loss_has_its_own_time_or_none() {
             );
         }
     }
-}
-
-#[test]
-fn a_time_frame_worked_by_hand() {
-    let codes = codes(0x12_3456, 0x0102_0304);
-    let frame = time_frame(Message::PoseTime, &codes, 0x150).expect("a sixteenth tick");
-    // Counter 5, the 20 low bits of the number, the time, low byte first.
-    assert_eq!(frame.bytes[1..], [0x65, 0x45, 0x23, 4, 3, 2, 1]);
-    assert_eq!(
-        PoseSender::default()
-            .frames(&reading(0), None)
-            .filter(|c| c.message == Message::PoseTime)
-            .count(),
-        0
-    );
 }
 
 /// Every status that a tracker gives to a valid or an invalid pose is distinguished on the bus.

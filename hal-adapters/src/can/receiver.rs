@@ -1,5 +1,5 @@
-//! From sensor frames to raw frames: one for every tick of which a frame came. Codes that did
-//! not come, or whose frame was not good, are missing.
+//! From sensor frames to raw frames: one for every tick with at least one frame. Codes without a good frame are
+//! missing.
 //!
 //! Call [`SensorReceiver::take`] with every frame of the bus and its receive time, and
 //! [`SensorReceiver::poll`] when no frame comes: at [`SensorReceiver::deadline_us`], or every
@@ -159,8 +159,8 @@ impl SensorReceiver {
         Some(BusFault::TicksLost { ticks })
     }
 
-    /// What the passing of time brings: a tick whose time is over, a source that is stale. A
-    /// source is reported as stale once; [`SensorReceiver::is_stale`] holds until a good frame.
+    /// Lets time pass: gives an overdue tick, and reports a stale source. A source is reported as stale once;
+    /// [`SensorReceiver::is_stale`] holds until a good frame.
     pub fn poll(&mut self, now_us: u32) -> Taken<RawFrame> {
         let taken = self.group.poll(now_us).map(|tick| match self.layout {
             Layout::Bits16 => raw_16(tick, self.temperature_mc),

@@ -21,7 +21,7 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// The messages of one tick, in the order in which they are sent.
+    /// The messages of one tick, in the order on the bus.
     pub const fn messages(self) -> &'static [Message] {
         match self {
             Self::Bits16 => &[Message::Hall, Message::Capacitive],
@@ -33,14 +33,14 @@ impl Layout {
         }
     }
 
-    /// The layout that a message with codes belongs to; `None` for a message without.
-    pub fn carrying(message: Message) -> Option<Self> {
+    /// The layout of a message with codes; `None` for any other message.
+    pub fn from_message(message: Message) -> Option<Self> {
         let has = |layout: &Self| layout.messages().contains(&message);
         [Self::Bits16, Self::Bits24].into_iter().find(has)
     }
 
-    /// The layout for a converter of so many bits.
-    pub const fn for_bits(code_bits: u32) -> Self {
+    /// The layout for a converter of `code_bits` bits.
+    pub const fn from_bits(code_bits: u32) -> Self {
         if code_bits <= 16 {
             Self::Bits16
         } else {
@@ -50,7 +50,7 @@ impl Layout {
 
     /// The narrowest layout that holds every code from `low` to `high`, or `None` if 24 bits
     /// are too few.
-    pub const fn that_holds(low: i32, high: i32) -> Option<Self> {
+    pub const fn from_range(low: i32, high: i32) -> Option<Self> {
         if fits(low, 16) && fits(high, 16) {
             Some(Self::Bits16)
         } else if fits(low, 24) && fits(high, 24) {
@@ -238,7 +238,7 @@ pub fn read_time<F: Frame>(frame: &F) -> Option<TickTime> {
     })
 }
 
-/// Every frame of a tick in the order in which it is sent: its time before its codes.
+/// Every frame of a tick in the order on the bus: its time before its codes.
 pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> + use<> {
     let codes = match layout {
         Layout::Bits16 => {
@@ -340,15 +340,15 @@ mod tests {
 
     #[test]
     fn the_narrowest_layout_is_taken() {
-        assert_eq!(Layout::that_holds(-32768, 32767), Some(Layout::Bits16));
-        assert_eq!(Layout::that_holds(-32769, 0), Some(Layout::Bits24));
-        assert_eq!(Layout::that_holds(0, 1 << 23), None);
+        assert_eq!(Layout::from_range(-32768, 32767), Some(Layout::Bits16));
+        assert_eq!(Layout::from_range(-32769, 0), Some(Layout::Bits24));
+        assert_eq!(Layout::from_range(0, 1 << 23), None);
         for layout in [Layout::Bits16, Layout::Bits24] {
             for message in layout.messages() {
-                assert_eq!(Layout::carrying(*message), Some(layout));
+                assert_eq!(Layout::from_message(*message), Some(layout));
             }
         }
-        assert_eq!(Layout::carrying(Message::SensorTime), None);
+        assert_eq!(Layout::from_message(Message::SensorTime), None);
     }
 
     proptest! {

@@ -57,7 +57,7 @@ pub struct Service {
     /// Token of the re-zero that runs.
     rezero: Option<u8>,
     was_refused: bool,
-    /// Ticks for which the servo is still declared off.
+    /// Remaining ticks of the declaration that the servo is off.
     servo_off_ticks: u32,
     /// Whether the service pin says that the servo is off; `None` without such a pin.
     servo_off_pin: Option<bool>,

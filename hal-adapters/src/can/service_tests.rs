@@ -150,7 +150,7 @@ fn a_stage_that_rests_elsewhere_is_zeroed_within_limits_of_its_own() {
         assert_eq!(stage.ask(REZERO, 2), Outcome::Started);
         stage.rest(500, 2)
     };
-    // The codes at rest are those of a stage some nm high and some nrad tilted.
+    // At these codes the stage is some nm high and some nrad tilted.
     assert_eq!(zeroed_within([1e-12; 3]), Some(Outcome::OutOfBounds));
     assert_eq!(zeroed_within([50e-6; 3]), Some(Outcome::Done));
 }
@@ -197,21 +197,4 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
     );
     (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None::<&PoseTracker>), None));
     assert_eq!(service.flags(None::<&PoseTracker>), flag::RECORDING);
-}
-
-#[test]
-fn a_repeated_command_is_neither_obeyed_nor_answered() {
-    let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
-    let command = Content::Command(Command::new(Request::Record { on: true }, 1));
-    let frame = BusFrame::from(host.send(&command).expect("a command"));
-    assert!(matches!(
-        service.take(&frame, None::<&mut PoseTracker>, None),
-        Some(Ok(_))
-    ));
-    assert!(matches!(
-        service.take(&frame, None::<&mut PoseTracker>, None),
-        Some(Err(BusFault::Repeated { .. }))
-    ));
-    let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
-    assert_eq!(service.take(&foreign, None::<&mut PoseTracker>, None), None);
 }

@@ -74,7 +74,7 @@ messages! {
     Answer: 0x1f0, 0xc3;
     /// Counters of the decoding node, one a frame.
     Health: 0x1ff, 0xd0;
-    /// Number and time of the tick whose pose was just sent.
+    /// Number and time of the tick of the pose that was just sent.
     PoseTime: 0x20c, 0xea;
     /// A word of new parameters.
     UpdateData: 0x230, 0xf7;

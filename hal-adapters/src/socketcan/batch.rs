@@ -146,9 +146,5 @@ mod tests {
             prop_assert_eq!(from_wire(&to_wire(&frame)), Some(frame));
         }
 
-        #[test]
-        fn any_sixteen_bytes_are_a_frame_or_none(wire: [u8; WIRE_BYTES]) {
-            let _ = from_wire(&wire);
-        }
     }
 }

@@ -176,7 +176,7 @@ impl SocketCan {
     /// Sends frames in this order; waits up to `deadline` whenever the transmit queue is full.
     ///
     /// # Errors
-    /// As [`SocketCan::send`]; the frames before the one that failed were sent.
+    /// As [`SocketCan::send`]; the frames before the failed one were sent.
     pub fn send_all(&self, frames: &[BusFrame], deadline: Duration) -> Result<(), SocketCanError> {
         let addressed: Vec<_> = frames.iter().map(|frame| self.node.to_bus(frame)).collect();
         let mut frames = &addressed[..];

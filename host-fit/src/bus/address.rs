@@ -1,10 +1,10 @@
-//! Where a node is: an interface, and its number on that bus.
+//! The address of a node: an interface, and the node's number on this bus.
 
 use hal_adapters::can::NodeNumber;
 use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::str::FromStr;
 
-/// A node of a bus: `can0`, or `can0@5` for node 5, whose frames have extended identifiers.
+/// A node of a bus: `can0`, or `can0@5` for node 5.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BusAddress {
     /// The CAN interface, for instance can0.
@@ -13,7 +13,7 @@ pub struct BusAddress {
     pub node: NodeNumber,
 }
 
-/// What is wrong with an address.
+/// A text that is no address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is no address on a bus: write an interface, as can0, and for another node than 0 its number from 1 to {}, as \

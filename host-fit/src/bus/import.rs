@@ -74,7 +74,7 @@ pub struct ImportReport {
     pub offset: Offset,
     /// Rows of the log.
     pub join: JoinCounts,
-    /// The record has temperatures, but the stage names no columns for them: the log leaves them out.
+    /// The record has temperatures, but the stage names no columns for them: the log has none.
     pub temperatures_left_out: bool,
 }
 

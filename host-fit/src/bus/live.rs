@@ -1,13 +1,11 @@
-//! `live`: decodes the sensor frames of a CAN bus as they come, with the decoder of the
-//! target, and publishes the pose.
+//! `live`: decodes the sensor frames of a CAN bus with the decoder of the target, and publishes the pose.
 //!
-//! `node` is the decoding node itself, without a bus and without a clock: frames and times
-//! in, frames out. [`run`](run()) puts it on an interface, records and shows it.
+//! `node` is the decoding node itself without a bus and a clock: frames and times in, frames out.
+//! [`run`](run()) connects it to an interface, records and shows it.
 
 mod bus;
 mod display;
 mod node;
-mod rhythm;
 mod run;
 
 pub use bus::BusError;
@@ -21,30 +19,30 @@ use runtime::OnInvalid;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What is decoded, and how.
+/// The settings of `live`.
 #[derive(Clone, Debug)]
 pub struct LiveSettings {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     pub can: BusAddress,
     /// The parameter blob.
     pub params: PathBuf,
-    /// Refuse a blob of another stage than the one with this serial number.
+    /// Refuse a blob without this serial number.
     pub serial: Option<String>,
     /// Record every frame received and sent, as `candump -L` does, in a new file.
     pub record: Option<PathBuf>,
-    /// Repeat the last valid pose for at most so many ticks where codes are bad.
+    /// How long the last valid pose is repeated where codes are bad.
     pub hold: OnInvalid,
-    /// Send each vertical axis in every so many ticks: 1, 2, 4, 8 or 16.
+    /// Ticks between two frames of a vertical axis: 1, 2, 4, 8 or 16.
     pub vertical_every: u8,
     /// Send nothing: only watch, record and show.
     pub listen_only: bool,
-    /// End after so many seconds; without it, on Ctrl-C.
+    /// When to end; `None`: on Ctrl-C.
     pub duration: Option<Duration>,
-    /// Seconds from line to line where output is no terminal.
+    /// Time from line to line where output is no terminal.
     pub every: Duration,
-    /// Give up a tick whose frames are not all there after so long.
+    /// Time after which an incomplete tick is given up, us.
     pub assembly_us: u32,
-    /// Call the sensors stale after so long without a good frame.
+    /// Time without a good frame after which the sensors are stale, us.
     pub stale_us: u32,
 }
 
@@ -82,7 +80,7 @@ pub enum LiveError {
     /// The record cannot be begun.
     #[error("cannot record to {0}")]
     NoRecord(OutputError),
-    /// The record ended before the run: it was decoded to its end all the same.
+    /// The record ended before the run; decoding went on.
     #[error("the record is not whole: {source}. It ends with the frames of {after_s:.0} s")]
     RecordEnded {
         /// Why.

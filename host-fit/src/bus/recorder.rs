@@ -1,12 +1,11 @@
-//! `record`: asks a controller for the codes of its own converter, and records the bus, in the
-//! form of `candump -L`, until the user stops it. No parameters are needed: the first calibration
-//! has none.
+//! `record`: asks a controller for the codes of its own converter, and records the bus like `candump -L` until the
+//! user stops it. The controller needs no parameters: the first calibration has none.
 
 mod run;
 mod watch;
 
 pub use run::run;
-pub use watch::Watch;
+pub use watch::Monitor;
 
 use super::BusAddress;
 use super::live::BusError;
@@ -16,31 +15,31 @@ use hal_adapters::can::update::Key;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What is recorded, and for how long.
+/// The settings of a record.
 #[derive(Clone, Debug)]
 pub struct RecorderSettings {
     /// The interface, and the number of the node.
     pub address: BusAddress,
-    /// Where to write the record; a file that is not there yet.
+    /// Where to write the record: a new file.
     pub out: PathBuf,
-    /// End after so long; on Ctrl-C if `None`.
+    /// When to end; `None`: on Ctrl-C.
     pub duration: Option<Duration>,
-    /// The stage's key: a controller with one sends its codes to whoever has it.
+    /// The stage's key, if the controller has one.
     pub key: Option<Key>,
-    /// Show on standard error, if that is a terminal, how it goes.
+    /// Show the counts on standard error, if that is a terminal.
     pub shows: bool,
 }
 
 /// A record.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// What it holds.
-    pub watch: Watch,
+    /// Its contents.
+    pub watch: Monitor,
     /// Whether the controller has confirmed that it sends no more codes.
     pub is_stopped: bool,
 }
 
-/// More missing ticks than one in so many spoil a record: `check` warns of such a log.
+/// A record with more missing ticks than one in this number is spoilt: `check` warns of such a log.
 pub const MISSING_ONE_IN: u64 = 1_000;
 
 /// Why there is no record, or none to calibrate by.
@@ -52,20 +51,20 @@ pub enum RecorderError {
     /// The record cannot be begun.
     #[error("cannot record to {0}")]
     NoRecord(OutputError),
-    /// The record ended before its time; what came before is kept.
+    /// The record ended before its time; its first part is kept.
     #[error("the record is not whole: {0}. It ends with the last frame that there was room for")]
     RecordEnded(#[from] OutputError),
-    /// Nobody answers.
+    /// No controller answers.
     #[error(
         "no controller at `{address}` answered the request to send its codes within 3 s; is it on, and is \
          the interface set to its bit rate (`ip -details link show`)? Where a sensor node sends the codes \
          and none is asked for, record with `candump -L`. Nothing was written"
     )]
     NoAnswer {
-        /// Where.
+        /// Its address.
         address: BusAddress,
     },
-    /// It refuses.
+    /// The controller refuses.
     #[error("the controller refuses to send its codes: {}. Nothing was written", match outcome {
         Some(Outcome::NotAuthorised) => "name the key of its stage with --key FILE",
         Some(Outcome::ServoOn) => "it has no key, and its line does not say that the servo is off. Switch that off, begin to \
@@ -77,14 +76,14 @@ pub enum RecorderError {
         /// Its answer.
         outcome: Option<Outcome>,
     },
-    /// It agreed, and no codes came.
+    /// The controller agreed, and no codes came.
     #[error(
         "the controller agreed to send its codes, but none came in {seconds:.1} s: {state}. Nothing was written"
     )]
     NoCodes {
         /// How long was recorded, s.
         seconds: f64,
-        /// What the controller says of itself.
+        /// State of the controller.
         state: String,
     },
     /// Too many ticks are missing.
@@ -92,11 +91,11 @@ pub enum RecorderError {
         "{missing} of {ticks} ticks are missing, more than one in {MISSING_ONE_IN}: {cause}. The record is kept in {}", path.display()
     )]
     TicksLost {
-        /// Ticks that are missing.
+        /// Missing ticks.
         missing: u64,
-        /// Ticks that came, and those.
+        /// All ticks, missing ones included.
         ticks: u64,
-        /// Where they may have been lost.
+        /// Where they were lost.
         cause: String,
         /// The record.
         path: PathBuf,

@@ -10,9 +10,9 @@ mod script;
 mod talk;
 
 pub use identity::Identity;
-pub use rezero::Zero;
+pub use rezero::RezeroSettings;
 pub use run::{identify, read_back, rezero, update};
-pub use script::{Plan, Updated};
+pub use script::{UpdateSettings, Updated};
 pub use talk::{Link, SPACING_US, Talk};
 /// The scripts without an interface.
 pub mod on {
@@ -29,9 +29,9 @@ use runtime::BlobError;
 /// Why a node was not identified, updated or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UpdateError {
-    /// The bus cannot be used.
-    #[error("the bus cannot be used")]
-    Link,
+    /// The bus cannot be used, or the record of it.
+    #[error("{0}")]
+    Link(String),
     /// No node answers.
     #[error(
         "no controller answered for 3 s; is it on, and is the interface set to its bit rate (`ip -details link show`)?"
@@ -55,7 +55,7 @@ pub enum UpdateError {
          or connect the other controller"
     )]
     OtherStage {
-        /// Serial number of the blob, or the one asked for.
+        /// Serial number of the blob, or of the request.
         expected: String,
         /// Serial number of the node.
         found: String,
@@ -101,7 +101,7 @@ pub enum UpdateError {
     /// Another host is updating the node.
     #[error("another computer is updating this controller; try again when it has finished")]
     Busy,
-    /// Nothing can be authorised.
+    /// The node has no random numbers to authorise a request.
     #[error(
         "the random number generator of the controller gives no numbers, so it cannot authorise anything; restart it. If \
          that does not help, the generator or its clock is broken"
@@ -198,7 +198,7 @@ impl UpdateError {
     const fn from_outcome(outcome: Outcome, detail: u32, declared: bool) -> Self {
         match outcome {
             Outcome::ServoOn => Self::ServoOn { declared },
-            // Another host has stored a blob since this one asked for the newest number.
+            // Another host has stored a blob since the newest number was asked.
             Outcome::Busy | Outcome::WrongSequence => Self::Busy,
             Outcome::UnknownCommand => Self::TellsNothing,
             Outcome::NoParameters => Self::NothingRuns,

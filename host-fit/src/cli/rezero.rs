@@ -3,7 +3,7 @@
 use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, Zero};
+use crate::bus::update::{self, RezeroSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;
@@ -26,7 +26,7 @@ pub(super) struct RezeroArgs {
 
 /// Makes the pose at rest the zero, or clears it.
 pub(super) fn run(args: &RezeroArgs) -> Result<(), HostError> {
-    let zero = Zero {
+    let zero = RezeroSettings {
         key: args.key.read()?,
         declares_servo_off: args.servo_off,
         clears: args.clear,

@@ -4,7 +4,7 @@ use super::identify;
 use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, Plan, Updated};
+use crate::bus::update::{self, UpdateSettings, Updated};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
@@ -43,7 +43,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
     };
     let updated = update::update(
         &args.can,
-        &Plan {
+        &UpdateSettings {
             blob,
             serial: args.serial.clone(),
             key: args.key.read()?,

@@ -204,7 +204,7 @@ mod app {
         by_fault: bool,
         identity: Identity<'static>,
     ) -> &'static mut Node<'static> {
-        let layout = Layout::for_bits(Converter::CODE_BITS);
+        let layout = Layout::from_bits(Converter::CODE_BITS);
         let node = Node::new(parameters, by_fault, layout, identity);
         place.write(node.with_rezero_limits(board::rezero_limits()))
     }

@@ -260,7 +260,7 @@ impl Seen {
                 );
                 self.temperatures.push((tick, [mount, body]));
             }
-            _ if Layout::carrying(message).is_some() => self.recorded += 1,
+            _ if Layout::from_message(message).is_some() => self.recorded += 1,
             _ => match AXES.iter().position(|axis| *axis == message) {
                 Some(axis) => self.axes.push(Axis {
                     tick,

@@ -5,7 +5,7 @@ use super::{KEY, NEW, OLD, SERIAL, activating, changed, for_serial, plan, undecl
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
-use host_fit::bus::update::{Plan, UpdateError, Updated, Zero, on};
+use host_fit::bus::update::{RezeroSettings, UpdateError, UpdateSettings, Updated, on};
 use tests::fault::Fault;
 use tests::flash_model::FlashModel;
 use tests::node::Node;
@@ -140,7 +140,7 @@ fn activated_parameters_run_are_reported_and_read_back() {
 fn a_stored_blob_is_not_sent_again_and_activated_alone() {
     let mut world = World::new(Some(KEY), &[], 12);
     let ended = |updated: Updated| (updated.is_stored, updated.sequence, updated.is_active);
-    let alone = Plan {
+    let alone = UpdateSettings {
         blob: None,
         activates: true,
         ..plan(&[])
@@ -180,7 +180,7 @@ fn a_lost_answer_to_a_commit_is_settled_by_asking_for_the_newest_blob() {
 fn each_refusal_has_its_reason_and_nothing_is_written() {
     let serial = "HS-0008";
     let foreign = changed(NEW, |set| set.serial = serial.try_into().expect("short"));
-    let with_key = |key| Plan { key, ..plan(NEW) };
+    let with_key = |key| UpdateSettings { key, ..plan(NEW) };
     let (expected, found) = ("HS-0008".to_owned(), SERIAL.to_owned());
     let other_stage = UpdateError::OtherStage { expected, found };
     let on = UpdateError::ServoOn { declared: false };
@@ -251,12 +251,12 @@ fn parameters_that_fault_twice_stop_the_node_until_others_are_stored() {
 
 #[test]
 fn a_stage_at_rest_is_zeroed_by_its_key_with_the_servo_off_on_a_bad_bus_too() {
-    let zero = Zero {
+    let zero = RezeroSettings {
         key: Some(KEY),
         declares_servo_off: true,
         clears: false,
     };
-    let rezero = |world: &mut World, zero: &Zero| on::rezero(&mut world.talk(), zero);
+    let rezero = |world: &mut World, zero: &RezeroSettings| on::rezero(&mut world.talk(), zero);
     let mut no_key = zero.clone();
     no_key.key = None;
     let mut undeclared = zero.clone();

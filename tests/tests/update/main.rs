@@ -6,7 +6,7 @@ mod hosts;
 mod world;
 
 use hal_adapters::can::update::Key;
-use host_fit::bus::update::Plan;
+use host_fit::bus::update::UpdateSettings;
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 
@@ -15,8 +15,8 @@ const NEW: &[u8] = include_bytes!("../../../runtime/examples/field.bin");
 const SERIAL: &str = "HS-0007";
 const KEY: Key = *b"a key for a test";
 
-fn plan(blob: &[u8]) -> Plan {
-    Plan {
+fn plan(blob: &[u8]) -> UpdateSettings {
+    UpdateSettings {
         blob: Some(blob.to_vec()),
         serial: Some(SERIAL.to_owned()),
         key: Some(KEY),
@@ -25,25 +25,25 @@ fn plan(blob: &[u8]) -> Plan {
     }
 }
 
-fn activating(plan: Plan) -> Plan {
-    Plan {
+fn activating(plan: UpdateSettings) -> UpdateSettings {
+    UpdateSettings {
         activates: true,
         ..plan
     }
 }
 
 /// Without a declaration that the servo is off.
-fn undeclared(plan: Plan) -> Plan {
-    Plan {
+fn undeclared(plan: UpdateSettings) -> UpdateSettings {
+    UpdateSettings {
         declares_servo_off: false,
         ..plan
     }
 }
 
 /// For the stage with this serial number.
-fn for_serial(serial: Option<&str>, plan: Plan) -> Plan {
+fn for_serial(serial: Option<&str>, plan: UpdateSettings) -> UpdateSettings {
     let serial = serial.map(str::to_owned);
-    Plan { serial, ..plan }
+    UpdateSettings { serial, ..plan }
 }
 
 /// A sound blob with a change.

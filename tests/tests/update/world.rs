@@ -4,7 +4,7 @@ use super::{OLD, SERIAL};
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Answer, Command, Content, Mailbox, Request};
 use hal_adapters::can::update::Key;
-use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
+use host_fit::bus::update::{Identity, Link, Talk, UpdateError, UpdateSettings, Updated, on};
 use std::collections::VecDeque;
 use tests::fault::{Channel, Fault};
 use tests::flash_model::FlashModel;
@@ -18,7 +18,7 @@ const START_US: u64 = 200_000;
 /// It is deaf while it erases a sector, too, us.
 const ERASE_US: u64 = 500_000;
 
-/// Flash of which a probe has written the first slot.
+/// Flash with this blob in its first slot, as a probe writes it.
 pub fn flashed(blob: &[u8]) -> FlashModel {
     let mut flash = FlashModel::erased();
     flash.load(0, blob);
@@ -149,7 +149,7 @@ impl World {
         Talk::new(self, token)
     }
 
-    pub fn update(&mut self, plan: &Plan) -> Result<Updated, UpdateError> {
+    pub fn update(&mut self, plan: &UpdateSettings) -> Result<Updated, UpdateError> {
         on::update(&mut self.talk(), plan, &mut |_, _| {})
     }
 

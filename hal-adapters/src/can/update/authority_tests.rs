@@ -67,7 +67,7 @@ fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
     for request in WITH_TAG {
         let mut bench = Bench::new(Some(KEY));
         bench.servo_off();
-        // None at all, and none that was asked for.
+        // Without a tag, and without a challenge.
         assert_eq!(bench.ask(request, 7), NOT_AUTHORISED, "{request:?}");
         // The tag of another token, of another request, and by another key.
         let other = Request::ServoOff { seconds: 254 };
@@ -162,31 +162,4 @@ fn a_second_host_is_refused_as_busy_until_the_first_is_done_or_silent() {
     assert_eq!(bench.update(UpdateRequest::Abort, 8), DONE);
     assert_eq!(bench.update(UpdateRequest::Abort, 8), DONE);
     assert_eq!(bench.update(commit(4), 8), (Outcome::NoTransfer, 0));
-}
-
-/// Whoever recorded a transfer that was never stored has a blob, a tag and a number that are still
-/// due. Only the nonce distinguishes them from an answer to this challenge.
-#[test]
-fn each_tag_asks_for_a_new_nonce_and_a_recorded_tag_answers_none() {
-    let mut bench = Bench::new(Some(KEY));
-    bench.servo_off();
-    let (mut nonces, mut recorded) = (Vec::new(), None);
-    for time in 0..20 {
-        let token = 7;
-        assert_eq!(bench.update_tagged(BEGIN, token), DONE);
-        let nonce = bench.nonce();
-        assert!(!nonces.contains(&nonce));
-        nonces.push(nonce);
-        bench.blob(token, NEW);
-        // One token for all: only the number distinguishes them.
-        let own = tag(&KEY, &nonce, &committing(4, token), NEW);
-        bench.tag(token, *recorded.get_or_insert(own));
-        // The first tag would be right: it is kept, and never used.
-        if time > 0 {
-            assert_eq!(bench.update(commit(4), token), STARTED);
-            bench.ends(token, (Outcome::NotAuthorised, 0));
-        }
-        bench.update(UpdateRequest::Abort, token);
-    }
-    assert_eq!(bench.store.newest, (3, OLD));
 }

@@ -9,7 +9,7 @@ use crate::can::command::{Answer, Command, Outcome, Request};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
-/// A transfer to which nothing came for so long is closed, s.
+/// A transfer without a frame for this time is closed, s.
 const IDLE_S: u32 = 5;
 
 /// An open transfer.
@@ -160,7 +160,7 @@ impl<'s> Receiver<'s> {
         }
     }
 
-    /// One tick: closes a transfer whose host is silent, and any transfer once the servo is on.
+    /// One tick: closes a transfer with a silent host, and any transfer once the servo is on.
     pub fn tick(&mut self, servo_is_off: bool) {
         let Some(transfer) = self.transfer.as_mut().filter(|t| t.commit.is_none()) else {
             return;
@@ -308,8 +308,8 @@ impl<'s> Receiver<'s> {
 
 const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
 
-/// Whether a blob is sound and belongs to the stage. A parameter set has 700 bytes: in a function of its
-/// own it leaves the stack at once.
+/// Whether a blob is sound and belongs to the stage. A parameter set has 700 bytes: a function of its own frees
+/// that stack at once.
 #[inline(never)]
 fn check(blob: &[u8], serial: Option<&str>) -> Result<(), BlobError> {
     let read = ParameterSet::from_bytes(blob);

@@ -9,27 +9,33 @@ pub(super) const WORD: usize = 4;
 const WORDS_MAX: usize = MAX_BYTES.div_ceil(WORD);
 const TAG_WORDS: usize = TAG_BYTES / WORD;
 /// Words of a blob and of its tag.
-const NOTED: usize = WORDS_MAX + TAG_WORDS;
+const WORDS: usize = WORDS_MAX + TAG_WORDS;
 
 /// Index of the tag's first word.
 pub const TAG_INDEX: u8 = 240;
 const _: () = assert!(WORDS_MAX <= TAG_INDEX as usize);
 
-/// The words that arrived, and which.
+/// The words that arrived: of the blob, then of the tag.
 #[derive(Clone, Debug)]
 pub(super) struct Staging {
-    blob: [[u8; WORD]; WORDS_MAX],
-    tag: [[u8; WORD]; TAG_WORDS],
-    /// One bit for each word of the blob, then for each of the tag.
-    there: [u8; NOTED.div_ceil(8)],
+    words: [[u8; WORD]; WORDS],
+    is_there: [bool; WORDS],
+}
+
+/// The place of a word by its index; `None` beyond a blob of `bytes` bytes and its tag.
+fn place(index: u8, bytes: usize) -> Option<usize> {
+    let k = usize::from(index);
+    match k.checked_sub(usize::from(TAG_INDEX)) {
+        Some(k) => (k < TAG_WORDS).then_some(WORDS_MAX + k),
+        None => (k < bytes.div_ceil(WORD)).then_some(k),
+    }
 }
 
 impl Staging {
     /// No word yet.
     pub(super) const EMPTY: Self = Self {
-        blob: [[0; WORD]; WORDS_MAX],
-        tag: [[0; WORD]; TAG_WORDS],
-        there: [0; NOTED.div_ceil(8)],
+        words: [[0; WORD]; WORDS],
+        is_there: [false; WORDS],
     };
 
     /// Forgets all words.
@@ -39,65 +45,39 @@ impl Staging {
 
     /// Forgets the tag.
     pub(super) fn clear_tag(&mut self) {
-        for k in 0..TAG_WORDS {
-            self.note(WORDS_MAX + k, false);
+        for is_there in self.is_there.iter_mut().skip(WORDS_MAX) {
+            *is_there = false;
         }
     }
 
     /// Keeps a word of a blob of `bytes` bytes, or of the tag. Ignores any other index.
     pub(super) fn put(&mut self, index: u8, word: u32, bytes: usize) {
-        let k = usize::from(index);
-        let in_tag = k.checked_sub(usize::from(TAG_INDEX));
-        let (to, noted) = match in_tag {
-            Some(k) => (self.tag.get_mut(k), WORDS_MAX + k),
-            None if k < bytes.div_ceil(WORD) => (self.blob.get_mut(k), k),
-            None => return,
-        };
-        if let Some(to) = to {
-            *to = word.to_le_bytes();
-            self.note(noted, true);
+        if let Some(k) = place(index, bytes)
+            && let (Some(to), Some(is_there)) = (self.words.get_mut(k), self.is_there.get_mut(k))
+        {
+            (*to, *is_there) = (word.to_le_bytes(), true);
         }
-    }
-
-    fn note(&mut self, noted: usize, is_there: bool) {
-        if let Some(there) = self.there.get_mut(noted / 8) {
-            let bit = 1 << (noted % 8);
-            *there = if is_there {
-                *there | bit
-            } else {
-                *there & !bit
-            };
-        }
-    }
-
-    fn is_there(&self, noted: usize) -> bool {
-        let there = self.there.get(noted / 8);
-        there.is_some_and(|bits| bits >> (noted % 8) & 1 == 1)
     }
 
     /// Index of the first missing word of a blob of `bytes` bytes, and of its tag if `with_tag`.
     pub(super) fn missing(&self, bytes: usize, with_tag: bool) -> Option<u8> {
-        let blob = (0..bytes.div_ceil(WORD)).map(|k| (k, k));
-        let tag = (0..TAG_WORDS).map(|k| (usize::from(TAG_INDEX) + k, WORDS_MAX + k));
-        let tag = tag.filter(|_| with_tag);
-        let (index, _) = blob.chain(tag).find(|(_, noted)| !self.is_there(*noted))?;
-        u8::try_from(index).ok()
+        let indices = 0..=if with_tag { u8::MAX } else { TAG_INDEX - 1 };
+        let is_there = |k: usize| self.is_there.get(k).copied().unwrap_or(false);
+        indices
+            .into_iter()
+            .find(|index| place(*index, bytes).is_some_and(|k| !is_there(k)))
     }
 
     /// The blob.
     pub(super) fn blob(&self, bytes: usize) -> &[u8] {
-        let whole = self.blob.as_flattened();
-        whole.get(..bytes).unwrap_or(whole)
+        self.words.as_flattened().get(..bytes).unwrap_or_default()
     }
 
     /// The tag.
     pub(super) fn tag(&self) -> [u8; TAG_BYTES] {
-        // Always sixteen bytes.
-        *self
-            .tag
-            .as_flattened()
-            .first_chunk()
-            .unwrap_or(&[0; TAG_BYTES])
+        // Always the last sixteen bytes.
+        let words = self.words.as_flattened();
+        *words.last_chunk().unwrap_or(&[0; TAG_BYTES])
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Running<'r> {
     pub serial: &'r str,
 }
 
-/// Why a blob was not stored. The newest blob is the one before.
+/// Why a blob was not stored. The newest blob is then the same as before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotWritten {
     /// The supply is too low to write.

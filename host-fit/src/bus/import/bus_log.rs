@@ -1,4 +1,4 @@
-//! Frames of a bus to ticks, by the receiver that a controller has.
+//! Frames of a bus to ticks, by the receiver of a controller.
 
 use hal_adapters::can::{BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing};
 use runtime::RawFrame;
@@ -22,33 +22,32 @@ impl BusTick {
     }
 }
 
-/// What a record held.
+/// The contents of a record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusCounts {
     /// Lines with a frame.
     pub frames: usize,
-    /// Lines that were left out because they cannot be read.
+    /// Skipped lines that cannot be read.
     pub bad_lines: usize,
-    /// Lines that hold no classic data frame: error frames, CAN FD.
+    /// Lines without a classic data frame: error frames, CAN FD.
     pub other_lines: usize,
     /// Whole ticks.
     pub ticks: usize,
-    /// Whole ticks that were left out because a code is at a rail of its converter.
+    /// Skipped whole ticks with a code at a rail of its converter.
     pub saturated: usize,
-    /// Whole ticks that were left out because their time is not certain, or because they belong to
-    /// another run of the node than the longest.
+    /// Skipped whole ticks with an uncertain time, or of a shorter run of the node.
     pub untimed: usize,
-    /// How often the node started again.
+    /// Restarts of the node.
     pub restarts: usize,
-    /// Ticks missing between them, those that were not whole included.
+    /// Missing ticks between them, incomplete ticks included.
     pub ticks_missing: u64,
     /// Places where ticks are missing.
     pub gaps: usize,
-    /// What the receiver noticed.
+    /// Counters of the receiver.
     pub health: BusHealth,
 }
 
-/// A recorded tick may have been delayed as a whole: what is missing shows by the counters.
+/// A whole tick may be recorded late; the counters show missing ticks.
 const TIMING: Timing = Timing {
     assembly_us: 20_000,
     stale_us: u32::MAX / 4,
@@ -65,7 +64,7 @@ pub(in crate::bus) struct Collector {
 }
 
 impl Collector {
-    /// Takes the layout from the first frame with codes if it is not given.
+    /// Without a given layout the first frame with codes decides.
     pub(in crate::bus) fn new(layout: Option<Layout>) -> Self {
         Self {
             layout,
@@ -77,7 +76,7 @@ impl Collector {
     pub(in crate::bus) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
         self.counts.frames += 1;
         if self.layout.is_none() {
-            self.layout = Message::from_id(stamped.frame.id).and_then(Layout::carrying);
+            self.layout = Message::from_id(stamped.frame.id).and_then(Layout::from_message);
         }
         let layout = self.layout?;
         let new = || SensorReceiver::new(layout, TIMING);
@@ -109,7 +108,7 @@ impl Collector {
         })
     }
 
-    /// What came so far.
+    /// The counts so far.
     pub(in crate::bus) fn counts(&self) -> BusCounts {
         let health = self.receiver.as_ref().map(SensorReceiver::health);
         BusCounts {
@@ -118,7 +117,7 @@ impl Collector {
         }
     }
 
-    /// How codes come, once some have.
+    /// The layout of the codes, once known.
     pub(in crate::bus) const fn layout(&self) -> Option<Layout> {
         self.layout
     }

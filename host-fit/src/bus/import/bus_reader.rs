@@ -1,7 +1,7 @@
 //! A candump log to ticks with the times of their samples.
 
 use super::bus_log::{BusCounts, BusTick, Collector};
-use super::node_clock::{NodeClock, Run};
+use super::node_clock::{NodeClock, NodeRun};
 use super::{ImportError, ImportSettings};
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
@@ -9,20 +9,20 @@ use hal_adapters::candump::{LineError, LogLine};
 use hallstage_input::log::LogError;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
-use hallstage_input::stage::{CodeScale, Stage};
+use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 
-/// Ticks of a record, at most: two hours at 500 Hz.
+/// Most ticks of a record: two hours at 500 Hz.
 const TICKS_MAX: usize = 3_600_000;
 
-/// Reads a record of the bus: the ticks of its longest run, and what it held.
+/// Reads a record of the bus: the ticks of its longest run, and its counts.
 ///
 /// # Errors
 /// `Log`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
 pub(super) fn read(
     settings: &ImportSettings,
     stage: &Stage,
-) -> Result<(Run, BusCounts), ImportError> {
+) -> Result<(NodeRun, BusCounts), ImportError> {
     let mut reader = BusReader {
         settings,
         stage,
@@ -69,20 +69,20 @@ pub(super) fn read(
     Ok((run, counts))
 }
 
-/// Ticks of a record, at least: a quarter of a second.
+/// Fewest ticks of a record: a quarter of a second.
 const TICKS_MIN: usize = 125;
 
 /// A record of the bus while it is read.
 struct BusReader<'s> {
     settings: &'s ImportSettings,
     stage: &'s Stage,
-    /// The line in hand, from 1.
+    /// Number of the current line, from 1.
     line: usize,
     interface: Option<String>,
     node: NodeNumber,
     collector: Collector,
     clock: NodeClock,
-    /// Those that the collector and the clock do not know.
+    /// Counts that the collector and the clock do not have.
     counts: BusCounts,
 }
 
@@ -135,45 +135,28 @@ impl BusReader<'_> {
 
     /// Whether a tick has a code at a rail of its converter.
     fn is_saturated(&self, tick: &BusTick) -> Result<bool, ImportError> {
+        let (hall, gaps) = (&self.stage.hall, &self.stage.capacitive);
+        let hall = (Quantity::HALL.into_iter().zip(tick.codes.hall)).map(|code| (hall, code));
+        let gaps = (Quantity::GAPS.into_iter().zip(tick.codes.capacitive)).map(|code| (gaps, code));
         let mut is_sound = true;
-        let sensors = [
-            (&self.stage.hall, Quantity::HALL, tick.codes.hall),
-            (
-                &self.stage.capacitive,
-                Quantity::GAPS,
-                tick.codes.capacitive,
-            ),
-        ];
-        for (converter, quantities, codes) in sensors {
-            for (quantity, code) in quantities.into_iter().zip(codes) {
-                is_sound &= self.is_inside(converter, quantity, code)?;
+        for (converter, (quantity, code)) in hall.chain(gaps) {
+            let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
+            if !(code_min..=code_max).contains(&code) {
+                return Err(ImportError::OutsideConverter {
+                    path: self.settings.bus.clone(),
+                    line: self.line,
+                    sensor: quantity.key(),
+                    code,
+                    code_min,
+                    code_max,
+                });
             }
+            is_sound &= converter.window.contains(code);
         }
         Ok(!is_sound)
     }
 
-    /// Whether a code is between the rails of its converter.
-    fn is_inside(
-        &self,
-        converter: &CodeScale,
-        quantity: Quantity,
-        code: i32,
-    ) -> Result<bool, ImportError> {
-        let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
-        if (code_min..=code_max).contains(&code) {
-            return Ok(converter.window.contains(code));
-        }
-        Err(ImportError::OutsideConverter {
-            path: self.settings.bus.clone(),
-            line: self.line,
-            sensor: quantity.key(),
-            code,
-            code_min,
-            code_max,
-        })
-    }
-
-    /// Whether a frame belongs to the interface that is read; the first one's, if none was named.
+    /// Whether a frame belongs to the chosen interface, or without a choice to the interface of the first frame.
     fn is_chosen(&mut self, found: &LogLine<'_>) -> Result<bool, ImportError> {
         let interface = self
             .interface

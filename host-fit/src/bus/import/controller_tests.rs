@@ -35,8 +35,8 @@ fn temperature_mc(n: u32) -> [i32; 2] {
     [20_000 + (n / 50) as i32, 21_000 - n.div_ceil(50) as i32]
 }
 
-/// The record by a computer whose clock is the true one: the controller's runs faster by
-/// `fast`, and each frame comes after those before it.
+/// The record by a computer with a true clock: the controller's clock runs faster by `fast`, and the frames
+/// arrive in order.
 fn candump(fast: f64) -> String {
     let mut text = String::new();
     let (mut poses, mut temperatures) = (PoseSender::default(), TemperatureSender::START);
@@ -75,8 +75,8 @@ fn reference(fast: f64) -> String {
     text
 }
 
-/// Largest distance from the codes to those of the reference beside them, m; and the report. Each row has
-/// the temperatures of its tick.
+/// Largest distance between the codes and the reference in their row, m; and the report. Each row has the
+/// temperatures of its tick.
 fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
     let (distance_m, rows, report) = try_import(controller, interferometer).expect("imported");
     let differ = rows.iter().filter(|row| {

@@ -7,7 +7,7 @@ use hallstage_input::log::LogError;
 use hallstage_input::stage::StageError;
 use std::path::PathBuf;
 
-/// Why an import was refused. Nothing was written.
+/// Why an import was refused. The output is not written.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The stage file is refused.
@@ -17,13 +17,13 @@ pub enum ImportError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// A line of the record is broken.
-    #[error("{}, line {line}: {fault}; mend the line, or leave such lines out with --skip-bad-lines", path.display())]
+    #[error("{}, line {line}: {fault}; mend the line, or skip such lines with --skip-bad-lines", path.display())]
     BadLine {
         /// The record.
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Its fault.
         fault: LineError,
     },
     /// The record holds frames of several interfaces.
@@ -38,7 +38,7 @@ pub enum ImportError {
         line: usize,
         /// The interface so far.
         interface: String,
-        /// The other one.
+        /// The other interface.
         other: String,
     },
     /// The record holds no whole ticks that can be timed.

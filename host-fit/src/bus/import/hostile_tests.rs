@@ -3,32 +3,7 @@
 
 use super::tests::{candump, files, reference};
 use super::*;
-use hallstage_input::log::LogProblem;
-use hallstage_input::source::SourceProblem;
 use std::fmt::Write;
-use std::path::Path;
-
-#[test]
-fn a_device_without_end_is_refused_by_its_start() {
-    let zero = Path::new("/dev/zero");
-    if !zero.exists() {
-        return;
-    }
-    let is_binary = |error: &ImportError| match error {
-        ImportError::Log(error) => {
-            matches!(
-                error.problem,
-                LogProblem::Source(SourceProblem::Binary { .. })
-            )
-        }
-        _ => false,
-    };
-    let bus = files("", &reference()).with(|settings| settings.bus = zero.into());
-    bus.refused(is_binary);
-    let bus = candump(|_, _| false);
-    let ifm = files(&bus, "").with(|settings| settings.reference = zero.into());
-    ifm.refused(is_binary);
-}
 
 #[test]
 fn two_records_in_one_file_are_refused_where_the_second_begins() {
@@ -39,23 +14,6 @@ fn two_records_in_one_file_are_refused_where_the_second_begins() {
     twice.refused(
         |error| matches!(error, ImportError::TwoRecords { line, .. } if second.contains(line)),
     );
-}
-
-#[test]
-fn a_frame_for_which_the_clock_leapt_ahead_is_left_out_with_its_tick() {
-    let sound = candump(|_, _| false);
-    let want = files(&sound, &reference()).run();
-    let leaps = |(number, line): (usize, &str)| {
-        let seconds = |line: &str| line[1..line.find('.')?].parse::<u64>().ok();
-        match (number, seconds(line)) {
-            (900, Some(s)) => line.replacen(&s.to_string(), &(s + 1).to_string(), 1) + "\n",
-            _ => format!("{line}\n"),
-        }
-    };
-    let bus: String = sound.lines().enumerate().map(leaps).collect();
-    assert!(bus != sound);
-    let have = files(&bus, &reference()).run();
-    assert!(want.join.rows - have.join.rows <= 32, "{}", have.join.rows);
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Ticks and reference go together by time: the reference at the time of a tick lies on the
-//! straight line between the samples before and after it.
+//! Joins ticks and reference by time: the reference at the time of a tick lies on the straight line between the
+//! samples before and after it.
 
 use super::ImportError;
 use super::node_clock::Tick;
@@ -19,7 +19,7 @@ pub struct JoinedRow {
     pub codes: RawFrame,
 }
 
-/// How ticks and reference went together.
+/// The counts of a join.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JoinCounts {
     /// Ticks.
@@ -28,15 +28,15 @@ pub struct JoinCounts {
     pub bus_us: [f64; 2],
     /// First and last sample of the reference, us.
     pub reference_us: [f64; 2],
-    /// How long the movements of the reference are together, s.
+    /// Duration of all movements of the reference, s.
     pub reference_s: f64,
-    /// For how much of that there are rows, s.
+    /// Duration of the part with rows, s.
     pub covered_s: f64,
     /// Rows.
     pub rows: usize,
     /// Ticks before the first or after the last sample.
     pub outside: usize,
-    /// Ticks whose samples before and after belong to different movements.
+    /// Ticks between samples of different movements.
     pub between_movements: usize,
     /// Ticks with a sample before or after further away than the tolerance.
     pub too_far: usize,
@@ -45,7 +45,7 @@ pub struct JoinCounts {
 }
 
 impl JoinCounts {
-    /// Refuses records of which most found no partner in the other.
+    /// Refuses records if most of one has no partner in the other.
     ///
     /// # Errors
     /// `Unpaired`.
@@ -59,7 +59,7 @@ impl JoinCounts {
 
 /// The reference at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum At {
+pub(super) enum ReferenceAt {
     Found {
         movement: i64,
         values: [f64; 3],
@@ -71,22 +71,22 @@ pub(super) enum At {
 }
 
 /// The reference at a time.
-pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> At {
+pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> ReferenceAt {
     let next = samples.partition_point(|sample| sample.t_us < t_us);
     let Some(after) = samples.get(next) else {
-        return At::Outside;
+        return ReferenceAt::Outside;
     };
     let before = match next.checked_sub(1).and_then(|k| samples.get(k)) {
         _ if after.t_us == t_us => after,
         Some(before) => before,
-        None => return At::Outside,
+        None => return ReferenceAt::Outside,
     };
     if before.movement != after.movement {
-        return At::BetweenMovements;
+        return ReferenceAt::BetweenMovements;
     }
     let (since, until) = (t_us - before.t_us, after.t_us - t_us);
     if since > tolerance_us || until > tolerance_us {
-        return At::TooFar;
+        return ReferenceAt::TooFar;
     }
     let part = if until > 0.0 {
         since / (since + until)
@@ -94,7 +94,7 @@ pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> At {
         0.0
     };
     let between = |k: usize| before.values[k] + part * (after.values[k] - before.values[k]);
-    At::Found {
+    ReferenceAt::Found {
         movement: before.movement,
         values: [0, 1, 2].map(between),
         nearest_us: since.min(until),
@@ -107,7 +107,7 @@ const GAP_TICKS: f64 = 10.0;
 /// Joins ticks with a reference; `reference_us` puts a time of the node on the reference's clock.
 ///
 /// # Errors
-/// Those of `take`.
+/// The errors of `take`.
 pub(super) fn join(
     ticks: &[Tick],
     samples: &[Sample],
@@ -115,7 +115,7 @@ pub(super) fn join(
     (tolerance_us, period_us): (f64, f64),
     take: &mut dyn FnMut(&JoinedRow) -> Result<(), ImportError>,
 ) -> Result<JoinCounts, ImportError> {
-    // The log holds whole microseconds; the reference is taken at what it holds.
+    // The log holds whole microseconds, so the reference is taken there.
     let t_us = |tick: &Tick| reference_us(tick.t_us).round();
     let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(f64::NAN));
     let span_s = |movement: &[Sample]| match movement {
@@ -140,19 +140,19 @@ pub(super) fn join(
     for tick in ticks {
         let t_us = t_us(tick);
         let (movement, values, nearest_us) = match at(samples, t_us, tolerance_us) {
-            At::Outside => {
+            ReferenceAt::Outside => {
                 counts.outside += 1;
                 continue;
             }
-            At::BetweenMovements => {
+            ReferenceAt::BetweenMovements => {
                 counts.between_movements += 1;
                 continue;
             }
-            At::TooFar => {
+            ReferenceAt::TooFar => {
                 counts.too_far += 1;
                 continue;
             }
-            At::Found {
+            ReferenceAt::Found {
                 movement,
                 values,
                 nearest_us,

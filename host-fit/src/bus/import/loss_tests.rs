@@ -1,4 +1,4 @@
-//! Frames that the recorder lost or received late: whatever is missing, each row is that of its tick.
+//! Frames that the recorder lost or received late: each row still holds the data of its own tick.
 
 use super::tests::{Import, files, hall, record, reference};
 use super::*;
@@ -10,8 +10,8 @@ fn sampled_us(n: u32) -> f64 {
     2_000.0 * f64::from(n) + 300.0
 }
 
-/// A record in which the capacitive codes are each tick's number. `received_us` says when a frame
-/// of a tick was received, us on the clock of the reference, if it was.
+/// A record with the tick's number as capacitive codes. `received_us` is the receive time of a frame, us on the
+/// clock of the reference, or `None` for a lost frame.
 fn candump(received_us: impl Fn(u32, &Coded) -> Option<f64>) -> String {
     let codes = |n| (hall(sampled_us(n)), [n as i32 + 1; 3], n + 5, 2_000 * n);
     record(codes, |n, _, coded| received_us(n, coded))

@@ -1,41 +1,40 @@
-//! When the sensor node sampled each tick, by its own clock.
+//! The time of each tick's sample, by the clock of the sensor node.
 //!
-//! One tick in 16 has a time frame with its number and time; the others have the last four bits of
-//! their number. Between two time frames that follow each other in number and time every tick that
-//! came has its place. Ticks beside a time frame that is missing, or out of order, are left out: 16
-//! ticks may be lost there unseen, and receive times do not show it.
+//! One tick in 16 has a time frame with its number and time; all ticks have the last four bits of their number.
+//! Between two successive time frames each recorded tick has one place. Ticks beside a time frame that is missing
+//! or out of order are skipped: 16 ticks may be lost there unseen, and receive times do not show it.
 
 use super::bus_log::BusTick;
 use hal_adapters::can::sensor::TickTime;
 use runtime::RawFrame;
 
-/// Numbers that a time frame distinguishes.
+/// Range of the numbers in time frames.
 const NUMBERS: u32 = 1 << 20;
 
 /// Ticks from one time frame to the next.
 const TICKS: u32 = 16;
 
-/// A node may miss ticks, which it does not number, for so long, us.
+/// Longest time of ticks that a node misses, us. It does not number them.
 const MISSED_MAX_US: f64 = 1e6;
 
 /// How far the node's clock and the designed servo period may differ, as a part of one.
 const CLOCK_SHARE: f64 = 1e-3;
 
-/// Ticks of which the first to arrive shows how far the recorder's clock is from the node's: half a
-/// second at 500 Hz.
+/// Ticks of a block, half a second at 500 Hz. The earliest arrival of a block shows the distance between the
+/// recorder's clock and the node's.
 const BLOCK_TICKS: usize = 250;
 
 /// Codes of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tick {
-    /// When they were sampled, us since the first time frame of the run by the node's clock.
+    /// Time of their sample, us since the first time frame of the run by the node's clock.
     pub(super) t_us: f64,
     pub(super) codes: RawFrame,
 }
 
 /// Ticks since the node started.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Run {
+pub(super) struct NodeRun {
     pub(super) ticks: Vec<Tick>,
     /// From the record's first time frame to the run's, us by the recorder's clock.
     pub(super) since_start_us: f64,
@@ -43,7 +42,7 @@ pub(super) struct Run {
     delays_us: Vec<f64>,
 }
 
-impl Run {
+impl NodeRun {
     fn push(&mut self, tick: &BusTick, t_us: f64) {
         let delay_us = tick.received_us as f64 - t_us;
         if self.ticks.len().is_multiple_of(BLOCK_TICKS) {
@@ -58,9 +57,8 @@ impl Run {
         });
     }
 
-    /// Time by the recorder's clock less time by the node's, us: the median over the record, which a
-    /// difference in speed leaves at its value in the middle, and a clock that was set at that of the
-    /// longer part.
+    /// Time by the recorder's clock less time by the node's, us: the median over the record. With clocks of
+    /// different speed it is the value in the middle; if a clock was set, the value of the longer part.
     pub(super) fn recorder_less_node_us(&self) -> f64 {
         let mut delays_us = self.delays_us.clone();
         let middle = delays_us.len() / 2;
@@ -88,8 +86,8 @@ pub(super) struct NodeClock {
     first_us: u64,
     /// Ticks since the mark.
     waiting: Vec<BusTick>,
-    run: Run,
-    longest: Run,
+    run: NodeRun,
+    longest: NodeRun,
     /// How often the node started again.
     pub(super) restarts: usize,
     /// Ticks between two time frames, without a certain place.
@@ -97,7 +95,7 @@ pub(super) struct NodeClock {
 }
 
 impl NodeClock {
-    /// Of a stage whose ticks are this far apart, us.
+    /// For a stage with this servo period, us.
     pub(super) fn new(period_us: f64) -> Self {
         Self {
             period_us,
@@ -107,7 +105,7 @@ impl NodeClock {
 
     /// Takes a whole tick.
     pub(super) fn take(&mut self, tick: BusTick) {
-        // A time frame distinguishes no more than so many.
+        // The counters distinguish no more ticks.
         if self.waiting.len() <= TICKS as usize {
             self.waiting.push(tick);
         } else {
@@ -115,8 +113,10 @@ impl NodeClock {
         }
     }
 
-    /// Takes a time frame. The error is by how much the recorder's clock is back where the node
-    /// starts again, us: another record begins.
+    /// Takes a time frame.
+    ///
+    /// # Errors
+    /// Another record begins: the node started again and the recorder's clock went back by this time, us.
     pub(super) fn take_time(&mut self, frame: TickTime, received_us: u64) -> Result<(), u64> {
         let waiting = std::mem::take(&mut self.waiting);
         let mut mark = Mark {
@@ -161,19 +161,19 @@ impl NodeClock {
         Ok(())
     }
 
-    /// How many ticks have a time.
+    /// Number of ticks with a time.
     pub(super) fn timed(&self) -> usize {
         self.run.ticks.len() + self.longest.ticks.len()
     }
 
-    /// The longest run; no frame follows.
-    pub(super) fn into_longest(mut self) -> (Run, usize) {
+    /// The longest run, and the number of untimed ticks, after the last frame.
+    pub(super) fn into_longest(mut self) -> (NodeRun, usize) {
         self.untimed += self.waiting.len();
         self.end_run();
         (self.longest, self.untimed)
     }
 
-    /// Ticks of a shorter run are left out.
+    /// Keeps the longer run.
     fn end_run(&mut self) {
         let mut run = std::mem::take(&mut self.run);
         if run.ticks.len() > self.longest.ticks.len() {

@@ -10,7 +10,7 @@
 mod rows;
 
 use super::ImportError;
-use super::node_clock::{Run, Tick};
+use super::node_clock::{NodeRun, Tick};
 use super::reference::{Reference, Sample};
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::stage::Stage;
@@ -96,7 +96,7 @@ const EXPLAINED_MIN: f64 = 0.6;
 /// Crystals differ by less. A larger difference means that the records do not belong together.
 const RATE_MAX: f64 = 500e-6;
 
-/// Length of the pieces in which a step of a clock shows, us.
+/// Length of a piece, us: a step of a clock shows within a piece.
 const PIECE_US: f64 = 1e7;
 
 /// Least motion of such a piece, relative to the mean motion of the record, to judge its explained share.
@@ -116,7 +116,7 @@ const STANDARD_ERROR_PERIODS_MAX: f64 = 0.1;
 const APART_PERIODS_MAX: f64 = 0.5;
 
 impl<'r> Records<'r> {
-    pub(super) fn new(run: &'r Run, reference: &'r Reference, stage: &'r Stage) -> Self {
+    pub(super) fn new(run: &'r NodeRun, reference: &'r Reference, stage: &'r Stage) -> Self {
         Self {
             ticks: &run.ticks,
             start_us: -run.since_start_us,

@@ -24,23 +24,22 @@ pub struct Sample {
     pub values: [f64; 3],
 }
 
-/// What a log of the reference held.
+/// The counts of a reference log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReferenceCounts {
     /// Rows.
     pub rows: usize,
-    /// Rows that were left out: the time of the row before again.
+    /// Skipped rows with the time of the row before.
     pub duplicates: usize,
-    /// Places where more than one and a half of the usual time passes between rows of a
-    /// movement.
+    /// Places with more than one and a half of the usual time between rows of a movement.
     pub gaps: usize,
-    /// Movements that started their time anew; each was put one period after the last.
+    /// Movements that start their time anew; each is put one period after the last.
     pub restarts: usize,
-    /// Whether there is a column for the movement; without one everything is movement 0.
+    /// Whether there is a column for the movement; otherwise all rows are movement 0.
     pub has_movements: bool,
 }
 
-/// Which cells hold what.
+/// The places of the cells.
 struct Cells {
     time: Source,
     movement: Option<Source>,
@@ -50,19 +49,19 @@ struct Cells {
 /// A cell of a displacement or rotation.
 struct Value {
     source: Source,
-    /// Units of the log's column per unit of this one.
+    /// Units of the log's column per unit of this column.
     log_units: f64,
     /// Largest sensible magnitude, m or rad.
     limit: f64,
     unit: &'static str,
 }
 
-/// Rows of a log, at most: two hours at 1 kHz.
+/// Most rows of a log: two hours at 1 kHz.
 const ROWS_MAX: usize = 7_200_000;
 
 /// A log of the reference.
 pub(super) struct Reference {
-    /// What the three values are.
+    /// The quantities of the three values.
     pub(super) quantities: [Quantity; 3],
     /// In ascending order of time.
     pub(super) samples: Vec<Sample>,

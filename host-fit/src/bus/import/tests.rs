@@ -32,11 +32,11 @@ pub(super) fn hall(t_us: f64) -> [i32; 3] {
 
 /// The record of the bus: jitter of up to 200 us, `skip` decides which frames are missing.
 pub(super) fn candump(skip: impl Fn(u32, usize) -> bool) -> String {
-    candump_of(skip, hall)
+    candump_with(skip, hall)
 }
 
 /// As [`candump`], with what the probes read.
-fn candump_of(skip: impl Fn(u32, usize) -> bool, hall: impl Fn(f64) -> [i32; 3]) -> String {
+fn candump_with(skip: impl Fn(u32, usize) -> bool, hall: impl Fn(f64) -> [i32; 3]) -> String {
     let codes = |n: u32| {
         let t_us = 2_000.0 * f64::from(n) + 300.0;
         (hall(t_us), [100, 101, 99], n + 5, t_us as u32)
@@ -152,8 +152,8 @@ impl Import {
 fn two_clocks_are_joined_and_the_offset_is_found() {
     let import = files(&candump(|_, _| false), &reference());
     let report = import.run();
-    // The earliest frames of each half second tell the recorder's clock, up to 100 us early here; that
-    // belongs to the offset.
+    // The earliest frames of each half second give the recorder's clock, up to 100 us early here; this is part
+    // of the offset.
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     assert!(report.offset.explained > 0.999);
@@ -206,8 +206,8 @@ fn a_given_offset_is_the_start_of_the_search() {
     import(-1e6).refused(|error| matches!(error, ImportError::NoOffset { .. }));
 }
 
-/// The motion is 212 um rms: noise of 40 um leaves 96 % of it explained, but tells the offset to no
-/// better than a quarter of a servo period.
+/// The motion is 212 um rms. With noise of 40 um 96 % of it is explained, but the offset is uncertain by a quarter
+/// of a servo period.
 #[test]
 fn an_offset_that_noise_leaves_uncertain_is_refused() {
     let standard_error_us = |noise_codes: f64| {
@@ -219,7 +219,7 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
             let [a, b, c] = hall(t_us);
             [a + noise(t_us, 0), b + noise(t_us, 1), c + noise(t_us, 2)]
         };
-        let bus = candump_of(|_, _| false, noisy);
+        let bus = candump_with(|_, _| false, noisy);
         let import = files(&bus, &reference());
         let outcome = run(&import.settings);
         assert_eq!(outcome.is_ok(), import.settings.out.exists());
@@ -248,7 +248,7 @@ fn on_a_circle_the_offset_is_uncertain() {
         let [x, y] = circle(t_us);
         [y, y, x].map(|s| (s / 6.25e-8).round() as i32)
     };
-    let bus = candump_of(|_, _| false, hall);
+    let bus = candump_with(|_, _| false, hall);
     let mut ifm = "t_us,x_m,y_m,rz_rad\n".to_owned();
     for k in 0..1_500 {
         let [x, y] = circle(1e3 * f64::from(k));
@@ -270,7 +270,7 @@ fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     let report = import.run();
     assert_eq!(report.reference.duplicates, 1);
     assert_eq!(report.bus.health.incomplete, 1);
-    // Three ticks are gone; the one after them only resumes the sequence.
+    // Three ticks are gone; the next tick only resumes the sequence.
     assert_eq!((report.bus.gaps, report.bus.ticks_missing), (2, 5));
     assert_eq!(report.join.rows, import.log().rows.len());
 }
@@ -303,10 +303,16 @@ fn a_broken_line_is_refused_with_its_number_or_left_out() {
     let mut lines: Vec<&str> = bus.lines().collect();
     lines[6] = &lines[6][..cut];
     let import = files(&lines.join("\n"), &reference());
-    let bad = LineError::BadData { column: 30 };
-    import.refused(
-        |error| matches!(error, ImportError::BadLine { line: 7, fault, .. } if *fault == bad),
-    );
+    import.refused(|error| {
+        matches!(
+            error,
+            ImportError::BadLine {
+                line: 7,
+                fault: LineError::Malformed { column: 30, .. },
+                ..
+            }
+        )
+    });
     let report = import.with(|settings| settings.skip_bad_lines = true).run();
     assert_eq!(report.bus.bad_lines, 1);
 }

@@ -18,7 +18,7 @@ mod none {
     use hal_adapters::can::{BusFrame, Message, NodeNumber, StampedFrame};
     use std::time::Duration;
 
-    /// Of SocketCAN's errors those that something is done about, and that there is none.
+    /// The errors of SocketCAN that callers handle, and the absence of SocketCAN.
     #[derive(Debug, thiserror::Error)]
     #[error(
         "a CAN bus needs SocketCAN, which only Linux has; on this system use a log of the bus with `import`"

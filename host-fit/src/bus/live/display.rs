@@ -1,18 +1,18 @@
-//! What `live` shows: a few lines that stay in place on a terminal, plain lines elsewhere.
+//! The display of `live`: a few lines that stay in place on a terminal, plain lines elsewhere.
 
-use super::rhythm::Pace;
 use hal_adapters::can::BusHealth;
 use runtime::tracker::Health;
 use runtime::{Reading, Status};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Everything that is shown.
+/// The displayed state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shown<'s> {
     pub(super) elapsed_s: f64,
     pub(super) reading: Option<&'s Reading>,
-    pub(super) pace: Option<Pace>,
+    /// Ticks per second.
+    pub(super) rate_hz: f64,
     pub(super) servo: Health,
     pub(super) bus: BusHealth,
     pub(super) dropped: u32,
@@ -21,7 +21,7 @@ pub(super) struct Shown<'s> {
     pub(super) is_down: bool,
 }
 
-/// Shows on standard output, or on standard error where that carries the record.
+/// Shows on standard output, or on standard error if standard output carries the record.
 #[derive(Debug)]
 pub(super) struct Display {
     on_stderr: bool,
@@ -73,7 +73,7 @@ impl Display {
         let _ = out.flush();
     }
 
-    /// Says something once, in a line of its own.
+    /// Prints a message in a line of its own.
     pub(super) fn say(&mut self, what: &str) {
         self.lines_up = 0;
         let _ = writeln!(std::io::stderr(), "{what}");
@@ -123,15 +123,11 @@ fn faults(bus: &BusHealth) -> String {
 
 fn block(shown: &Shown<'_>) -> Vec<String> {
     let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
-    let pace = shown.pace.unwrap_or_default();
     vec![
         format!("{:9.1} s   {}", shown.elapsed_s, state(shown)),
         format!("X  {x:10.3} um    Y  {y:10.3} um    Rz {rz:10.3} urad"),
         format!("Z  {z:10.3} um    Rx {rx:10.3} urad  Ry {ry:10.3} urad"),
-        format!(
-            "{:.1} ticks/s   jitter {:.0} us rms, {:.0} us peak to peak",
-            pace.rate_hz, pace.jitter_rms_us, pace.jitter_span_us
-        ),
+        format!("{:.1} ticks/s", shown.rate_hz),
         format!(
             "ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical",
             shown.servo.ticks,

@@ -94,7 +94,7 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     assert!(!node.receiver().is_stale());
 }
 
-/// Commands are the service's, whose tests are its own: this one holds that the node uses it.
+/// The service has its own tests; this test shows that the node uses it.
 #[test]
 fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
     let decoder = decoder();

@@ -3,7 +3,6 @@
 use super::bus::now_us;
 use super::display::{Display, Shown};
 use super::node::{Node, NodeSettings};
-use super::rhythm::{Pace, Rhythm};
 use super::{Bus, BusError, LiveError, LiveSettings};
 use crate::bus::BusAddress;
 use crate::output::record_file::RecordFile;
@@ -57,8 +56,8 @@ pub fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError> 
         sends: !settings.listen_only,
         display: Display::new(settings.record.as_deref().is_some_and(is_standard_output)),
         started: Instant::now(),
-        rhythm: Rhythm::default(),
-        pace: None,
+        shown_at: (0, Duration::ZERO),
+        rate_hz: 0.0,
         last: None,
         out: Vec::new(),
         not_sent: 0,
@@ -80,8 +79,8 @@ fn layout_of(set: &ParameterSet) -> Option<Layout> {
     let (hall, gaps) = (set.constants.hall_window, set.constants.capacitive_window);
     let low = hall.low.min(gaps.low).saturating_sub(1);
     let high = hall.high.max(gaps.high).saturating_add(1);
-    Layout::that_holds(low, high)
-        .or_else(|| Layout::that_holds(low.saturating_add(1), high.saturating_sub(1)))
+    Layout::from_range(low, high)
+        .or_else(|| Layout::from_range(low.saturating_add(1), high.saturating_sub(1)))
 }
 
 fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveError> {
@@ -104,8 +103,10 @@ struct Session<'d> {
     sends: bool,
     display: Display,
     started: Instant,
-    rhythm: Rhythm,
-    pace: Option<Pace>,
+    /// Decoded ticks and time at the last display.
+    shown_at: (u32, Duration),
+    /// Ticks per second between the last two displays.
+    rate_hz: f64,
     last: Option<Reading>,
     out: Vec<Coded>,
     not_sent: u32,
@@ -128,7 +129,11 @@ impl Session<'_> {
             }
             if elapsed >= next_show {
                 next_show = elapsed + interval;
-                self.pace = self.rhythm.pace();
+                let (ticks, since) = self.shown_at;
+                let now = self.node.tracker().health().ticks;
+                let s = (elapsed - since).as_secs_f64();
+                self.rate_hz = f64::from(now - ticks) / s;
+                self.shown_at = (now, elapsed);
                 self.show();
             }
             self.turn()?;
@@ -146,7 +151,7 @@ impl Session<'_> {
             frame = self.receive(wait.min(WAIT_MAX))?;
         }
         if frame.is_none() {
-            // The time is taken before the bus is asked again: what came before it was read.
+            // The time is taken before the bus is asked again, so all frames before it were read.
             let time_us = now_us();
             frame = self.receive(Duration::ZERO)?;
             if frame.is_none() {
@@ -181,8 +186,7 @@ impl Session<'_> {
     fn take(&mut self, frame: &StampedFrame) {
         self.record(frame);
         let step = self.node.take(frame, &mut self.out);
-        if let Some((raw, reading)) = step.tick {
-            self.rhythm.take(raw.sequence, frame.time_us);
+        if let Some((_, reading)) = step.tick {
             self.last = Some(reading);
         }
         if let Some(command) = step.command {
@@ -262,7 +266,7 @@ impl Session<'_> {
         let shown = Shown {
             elapsed_s: self.started.elapsed().as_secs_f64(),
             reading: self.last.as_ref(),
-            pace: self.pace,
+            rate_hz: self.rate_hz,
             servo: self.node.tracker().health(),
             bus: *self.node.receiver().health(),
             dropped: self.bus.dropped(),

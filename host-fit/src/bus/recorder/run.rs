@@ -1,6 +1,6 @@
-//! The controller asked, the bus recorded, the controller asked again.
+//! Asks the controller for codes, records the bus, and asks the controller to stop.
 
-use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
+use super::{MISSING_ONE_IN, Monitor, Recorded, RecorderError, RecorderSettings};
 use crate::bus::live::{Bus, BusError, now_us};
 use crate::bus::update::{Link, Talk, UpdateError};
 use crate::output::record_file::RecordFile;
@@ -24,7 +24,7 @@ const SHOWN_EVERY: Duration = Duration::from_millis(200);
 /// Records until Ctrl-C or the end of the duration.
 ///
 /// # Errors
-/// See [`RecorderError`]. Nothing is written unless codes came.
+/// See [`RecorderError`]. Without codes there is no file.
 pub fn run(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, RecorderError> {
     let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
     let mut session = Session {
@@ -35,7 +35,7 @@ pub fn run(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, R
             &messages,
         )?,
         file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
-        watch: Watch::default(),
+        watch: Monitor::default(),
         failure: None,
         // A node ignores a request that equals the last one: another token for each program.
         token: now_us() as u8,
@@ -71,7 +71,7 @@ struct Session<'s> {
     settings: &'s RecorderSettings,
     bus: Bus,
     file: RecordFile,
-    watch: Watch,
+    watch: Monitor,
     token: u8,
     /// Why the dialog ended, if not by an answer.
     failure: Option<RecorderError>,
@@ -152,8 +152,9 @@ impl Session<'_> {
     }
 
     fn failed(&mut self, error: RecorderError) -> UpdateError {
+        let link = UpdateError::Link(error.to_string());
         self.failure = Some(error);
-        UpdateError::Link
+        link
     }
 
     fn write(&mut self, stamped: &StampedFrame) -> Result<(), RecorderError> {
@@ -187,7 +188,7 @@ impl Session<'_> {
         }
     }
 
-    fn finish(mut self, end_us: u64) -> Result<Watch, RecorderError> {
+    fn finish(mut self, end_us: u64) -> Result<Monitor, RecorderError> {
         if self.shown.is_some() {
             let _ = write!(std::io::stderr(), "\r\x1b[2K");
         }

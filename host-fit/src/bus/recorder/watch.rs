@@ -1,13 +1,13 @@
-//! What a record holds so far.
+//! The contents of a record so far.
 
 use crate::bus::import::bus_log::{BusCounts, Collector};
 use hal_adapters::can::command::{Content, Mailbox};
 use hal_adapters::can::status::{NodeState, NodeStatus};
 use hal_adapters::can::{Layout, StampedFrame};
 
-/// Watches the frames that are recorded: ticks of codes, and what the controller says.
+/// Watches the recorded frames: ticks of codes, and the state of the controller.
 #[derive(Clone, Debug, Default)]
-pub struct Watch {
+pub struct Monitor {
     collector: Collector,
     mailbox: Mailbox,
     status: Option<NodeStatus>,
@@ -16,11 +16,11 @@ pub struct Watch {
     last_us: u64,
 }
 
-/// Codes that stay away for longer are missing, us. A record may end a little after them.
+/// Codes that are absent for longer are missing, us. A record may end a little after its codes.
 const SILENT_US: u64 = 1_000_000;
 
-impl Watch {
-    /// Takes a frame; gives what it says, other than codes and poses.
+impl Monitor {
+    /// Takes a frame.
     pub fn take(&mut self, stamped: &StampedFrame) {
         let before = self.counts().ticks;
         self.collector.take(stamped);
@@ -33,8 +33,7 @@ impl Watch {
         }
     }
 
-    /// Ticks that did not come between the last one and `end_us`, if that is long ago: codes that
-    /// stop leave no gap between ticks.
+    /// Ticks missing between the last tick and `end_us`, if that is long: codes that stop make no gap between ticks.
     pub fn missing_at_the_end(&self, end_us: u64) -> u64 {
         let silent_us = end_us.saturating_sub(self.last_us);
         let Some(first_us) = self.first_us.filter(|_| silent_us > SILENT_US) else {
@@ -44,7 +43,7 @@ impl Watch {
         silent_us * ticks / self.last_us.saturating_sub(first_us).max(1)
     }
 
-    /// How codes come, once some have.
+    /// The layout of the codes, once known.
     pub const fn layout(&self) -> Option<Layout> {
         self.collector.layout()
     }
@@ -54,7 +53,7 @@ impl Watch {
         self.collector.counts()
     }
 
-    /// What the controller says of itself.
+    /// The state of the controller.
     pub fn state(&self) -> String {
         let Some(status) = self.status else {
             return "it does not say its state".to_owned();
@@ -81,7 +80,7 @@ impl Watch {
     }
 }
 
-impl std::fmt::Display for Watch {
+impl std::fmt::Display for Monitor {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let counts = self.counts();
         let width = match self.layout() {
@@ -119,7 +118,7 @@ mod tests {
     #[test]
     fn ticks_and_gaps_of_either_layout_are_counted() {
         for layout in [Layout::Bits16, Layout::Bits24] {
-            let mut watch = Watch::default();
+            let mut watch = Monitor::default();
             for sequence in (0..100).filter(|s| !(20..22).contains(s) && *s != 50) {
                 let frame = RawFrame::new([1, 2, sequence as i32], [3; 3], sequence, 0);
                 for coded in sensor::frames(layout, &frame) {
@@ -133,25 +132,5 @@ mod tests {
                 (97, 2, 3)
             );
         }
-    }
-
-    #[test]
-    fn the_state_is_that_of_the_last_status() {
-        let (mut watch, mut node) = (Watch::default(), Mailbox::default());
-        assert_eq!(watch.state(), "it does not say its state");
-        let status = Content::Status(NodeStatus {
-            state: Some(NodeState::NoFrames),
-            reason: 3,
-            flags: 0,
-            missed_ticks: 0,
-            bus_off: 0,
-            version: 1,
-        });
-        let frame = node.send(&status).expect("a status");
-        watch.take(&stamped(frame, 0));
-        assert_eq!(
-            watch.state(),
-            "it gets no codes from its converter (reason 0x3)"
-        );
     }
 }

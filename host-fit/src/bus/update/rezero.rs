@@ -10,7 +10,7 @@ const SERVO_OFF_S: u8 = 15;
 
 /// The settings of a re-zero.
 #[derive(Clone, Debug, Default)]
-pub struct Zero {
+pub struct RezeroSettings {
     /// The stage's key.
     pub key: Option<Key>,
     /// Declare the servo off meanwhile.
@@ -24,7 +24,7 @@ pub struct Zero {
 /// # Errors
 /// [`UpdateError::ServoOn`], [`UpdateError::NotAtRest`] with the reason that the node gives, and the errors of
 /// [`Talk::exchange_tagged`].
-pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateError> {
+pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &RezeroSettings) -> Result<(), UpdateError> {
     let seconds = SERVO_OFF_S;
     if zero.declares_servo_off {
         let off = Request::ServoOff { seconds };

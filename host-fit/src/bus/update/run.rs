@@ -1,7 +1,8 @@
 //! The scripts on a CAN interface.
 
 use super::{
-    Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, Zero, identity, script,
+    Identity, Link, RezeroSettings, Talk, UpdateError, UpdateRunError, UpdateSettings, Updated,
+    identity, script,
 };
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
@@ -40,7 +41,7 @@ pub fn read_back(
 /// See [`UpdateRunError`].
 pub fn update(
     address: &BusAddress,
-    plan: &Plan,
+    plan: &UpdateSettings,
     watch: Watch<'_>,
 ) -> Result<Updated, UpdateRunError> {
     hold(address, watch, "updating", |talk, progress| {
@@ -52,7 +53,11 @@ pub fn update(
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn rezero(address: &BusAddress, zero: &Zero, watch: Watch<'_>) -> Result<(), UpdateRunError> {
+pub fn rezero(
+    address: &BusAddress,
+    zero: &RezeroSettings,
+    watch: Watch<'_>,
+) -> Result<(), UpdateRunError> {
     hold(address, watch, "re-zeroing", |talk, _| {
         super::on::rezero(talk, zero)
     })
@@ -69,15 +74,10 @@ struct Interface<'s> {
     bus: Bus,
     started: Instant,
     stop: &'s AtomicBool,
-    /// The error of the interface.
-    failure: Option<BusError>,
 }
 
-impl Interface<'_> {
-    fn failed(&mut self, error: BusError) -> UpdateError {
-        self.failure = Some(error);
-        UpdateError::Link
-    }
+fn broken(error: BusError) -> UpdateError {
+    UpdateError::Link(error.to_string())
 }
 
 impl Link for Interface<'_> {
@@ -85,13 +85,13 @@ impl Link for Interface<'_> {
         match self.bus.send_all(&[frame], SEND_DEADLINE) {
             // Lost, like a frame without an answer.
             Err(BusError::QueueFull { .. }) => Ok(()),
-            sent => sent.map_err(|error| self.failed(error)),
+            sent => sent.map_err(broken),
         }
     }
 
     fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError> {
         let wait = Duration::from_micros(until_us.saturating_sub(self.now_us()));
-        let received = self.bus.receive(wait).map_err(|error| self.failed(error))?;
+        let received = self.bus.receive(wait).map_err(broken)?;
         Ok(received.map(|stamped| stamped.frame))
     }
 
@@ -115,18 +115,14 @@ fn hold<T>(
         bus: Bus::open(&address.interface, address.node, &[Message::Answer])?,
         started: Instant::now(),
         stop: watch.stop,
-        failure: None,
     };
     let (mut talk, mut bar) = (Talk::new(link, now_token()), None);
     let result = talks(&mut talk, &mut |done, total| {
         bar.get_or_insert_with(|| watch.begin(what, total))
             .reach(done);
     });
-    result.map_err(|cause| match talk.link.failure.take() {
-        Some(error) => UpdateRunError::Bus(error),
-        None => UpdateRunError::Dialog {
-            address: address.clone(),
-            cause,
-        },
+    result.map_err(|cause| UpdateRunError::Dialog {
+        address: address.clone(),
+        cause,
     })
 }

@@ -20,7 +20,7 @@ const PROVEN_US: u64 = 2_500_000;
 
 /// The settings of an update.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct UpdateSettings {
     /// The blob to store, which the caller has checked; `None` for the newest one in the node's store.
     pub blob: Option<Vec<u8>>,
     /// Serial number that the node must have; `None`: the serial number of the blob, if both have one.
@@ -53,7 +53,7 @@ pub struct Updated {
 /// An update under way.
 struct Script<'p, L> {
     talk: &'p mut Talk<L>,
-    plan: &'p Plan,
+    plan: &'p UpdateSettings,
     /// The stage's key, if the node needs tags.
     key: Option<Key>,
     /// The blob that is to run.
@@ -74,7 +74,7 @@ struct Script<'p, L> {
 /// See [`UpdateError`]. The node keeps its parameters unless the error says otherwise.
 pub fn update<L: Link>(
     talk: &mut Talk<L>,
-    plan: &Plan,
+    plan: &UpdateSettings,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Updated, UpdateError> {
     let before = identify(talk)?;
@@ -278,7 +278,7 @@ impl<L: Link> Script<'_, L> {
 }
 
 /// The error if the node is, or may be, the node of another stage.
-fn other_stage(plan: &Plan, identity: &Identity) -> Option<UpdateError> {
+fn other_stage(plan: &UpdateSettings, identity: &Identity) -> Option<UpdateError> {
     let found = identity.serial.clone();
     let set = plan.blob.as_deref().map(ParameterSet::from_bytes);
     let own = set.and_then(Result::ok).map(|set| set.serial.to_string());

@@ -13,7 +13,7 @@ const PATIENCE_US: u64 = 100_000;
 /// Wait for the second answer after [`Outcome::Started`], us: longer than an erase of the flash, and than a
 /// re-zero at the longest servo period.
 const STARTED_US: u64 = 6_000_000;
-/// How often a request is sent: for 3 s, the time in which a controller starts.
+/// How often a request is sent: for 3 s, longer than a controller takes to start.
 const ATTEMPTS: u32 = 30;
 /// How often a request is sent with a new tag: a reset of the node, or a challenge that arrives late, makes
 /// a nonce void.

@@ -9,7 +9,7 @@ use crate::unicorn::register;
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
-use host_fit::bus::update::Plan;
+use host_fit::bus::update::UpdateSettings;
 
 /// A stored blob waits: the blob that ran runs after resets of any cause, until power-on.
 pub fn a_reset_runs_the_previous_blob(bench: &Bench) {
@@ -52,7 +52,7 @@ pub fn parameters_that_crash(bench: &Bench) {
     machine.run_ticks(600);
     machine.reset_by_pin();
     has_stopped(&mut machine);
-    let back = Plan {
+    let back = UpdateSettings {
         activates: true,
         ..plan(&bench.blob)
     };

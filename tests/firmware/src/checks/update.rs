@@ -11,7 +11,7 @@ use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::{NodeState, NodeStatus, board_check};
 use hal_adapters::can::update::{Key, UpdateRequest};
-use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
+use host_fit::bus::update::{Identity, Link, Talk, UpdateError, UpdateSettings, Updated, on};
 use std::collections::VecDeque;
 use tests::flash_model::Cut;
 
@@ -26,8 +26,8 @@ const S: u64 = 1_000_000_000;
 const UPDATE_S_MAX: f64 = 1.5;
 const STALL_S: std::ops::Range<f64> = 0.5..0.55;
 
-pub(super) fn plan(blob: &[u8]) -> Plan {
-    Plan {
+pub(super) fn plan(blob: &[u8]) -> UpdateSettings {
+    UpdateSettings {
         blob: Some(blob.to_vec()),
         serial: Some("stage-7".to_owned()),
         key: Some(KEY),
@@ -47,9 +47,12 @@ pub(crate) struct Wire<'m> {
 
 impl Link for Wire<'_> {
     fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
-        let data = frame.data().try_into().map_err(|_| UpdateError::Link)?;
+        let data = frame
+            .data()
+            .try_into()
+            .map_err(|_| UpdateError::Link(String::new()))?;
         let Id::Standard(id) = frame.id else {
-            return Err(UpdateError::Link);
+            return Err(UpdateError::Link(String::new()));
         };
         self.machine.chip.can.receive(id.as_raw(), data);
         Ok(())
@@ -58,7 +61,7 @@ impl Link for Wire<'_> {
     fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError> {
         while self.heard.is_empty() && self.now_us() < until_us {
             if self.machine.power_cuts != self.cuts {
-                return Err(UpdateError::Link);
+                return Err(UpdateError::Link(String::new()));
             }
             assert!(self.machine.chip.now_ns <= self.until_ns, "it does not end");
             self.machine.run_ns(STEP_NS);
@@ -97,11 +100,11 @@ pub(crate) fn talk<T>(
     (result, talk.link.seen)
 }
 
-fn update(machine: &mut Machine, plan: &Plan) -> (Result<Updated, UpdateError>, Seen) {
+fn update(machine: &mut Machine, plan: &UpdateSettings) -> (Result<Updated, UpdateError>, Seen) {
     talk(machine, |talk| on::update(talk, plan, &mut |_, _| {}))
 }
 
-pub(super) fn updated(machine: &mut Machine, plan: &Plan) -> Updated {
+pub(super) fn updated(machine: &mut Machine, plan: &UpdateSettings) -> Updated {
     update(machine, plan).0.expect("an update")
 }
 
@@ -154,7 +157,7 @@ pub fn new_parameters(bench: &Bench) {
 
     // Back again by the blob that ran before.
     for (sequence, blob) in [(2, &bench.later), (3, &bench.blob)] {
-        let activates = Plan {
+        let activates = UpdateSettings {
             activates: true,
             ..plan(blob)
         };
@@ -171,7 +174,7 @@ pub fn new_parameters(bench: &Bench) {
 /// A wrong key, the service pin, a broken generator of random numbers: nothing is written.
 pub fn refused(bench: &Bench) {
     let mut machine = bench.running(100);
-    let other = Plan {
+    let other = UpdateSettings {
         key: Some([0; 16]),
         ..plan(&bench.later)
     };

@@ -2,7 +2,7 @@
 
 use super::{Clocks, EXPLAINED_MIN, Records};
 use crate::bus::import::ImportError;
-use crate::bus::import::join::{At, at};
+use crate::bus::import::join::{ReferenceAt, at};
 use crate::bus::import::node_clock::Tick;
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::Vector3;
@@ -68,7 +68,7 @@ impl Records<'_> {
 
     /// Movement and pose at a time of the reference.
     fn at(&self, t_us: f64) -> Option<(i64, [f64; 3])> {
-        let At::Found {
+        let ReferenceAt::Found {
             movement, values, ..
         } = at(self.samples, t_us, 2.0 * self.period_us)
         else {
