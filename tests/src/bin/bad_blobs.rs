@@ -1,6 +1,6 @@
-//! Writes parameter blobs that a target must refuse, one for each reason, made of a good one.
+//! Writes parameter blobs that a target must refuse: cut short, of another stage, unusable.
 
-use runtime::blob::{CRC_BYTES, LAYOUT_VERSION, MAX_BYTES};
+use runtime::blob::MAX_BYTES;
 use runtime::model::Probes;
 use runtime::parameters::Text;
 use runtime::{BlobError, ParameterSet};
@@ -28,16 +28,6 @@ fn write_all(arguments: &[PathBuf]) -> Result<bool, Box<dyn Error>> {
     }
     cut.resize(16 * 1024, 0xff);
     write("cut.bin", &cut)?;
-    write("erased.bin", &[0xff; 16 * 1024])?;
-    let mut newer = blob.clone();
-    let body = newer.len() - CRC_BYTES;
-    if let Some(version) = newer.get_mut(4..6) {
-        version.copy_from_slice(&(LAYOUT_VERSION + 1).to_le_bytes());
-    }
-    let check = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&newer[..body]);
-    newer.truncate(body);
-    newer.extend(check.to_le_bytes());
-    write("newer.bin", &newer)?;
     let changed = |change: &dyn Fn(&mut ParameterSet)| -> Result<Vec<u8>, BlobError> {
         let mut changed = set.clone();
         change(&mut changed);
@@ -53,10 +43,6 @@ fn write_all(arguments: &[PathBuf]) -> Result<bool, Box<dyn Error>> {
                 probes[1].per_z_m = f32::NAN;
             }
         })?,
-    )?;
-    write(
-        "singular.bin",
-        &changed(&|set| set.plane.set_row(1, &set.plane.row(0).into_owned()))?,
     )?;
     Ok(true)
 }

@@ -58,13 +58,10 @@ struct Make {
     /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
     #[arg(long, default_value_t = 32_000)]
     parameters: usize,
-    /// Longest hold of an invalid value, ticks.
-    #[arg(long, default_value_t = 3)]
-    hold: u16,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
+
+/// Longest hold of an invalid value, ticks.
+const HOLD: u16 = 3;
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
@@ -81,7 +78,7 @@ fn read_blob(path: &Path) -> Result<ParameterSet, Box<dyn Error>> {
 }
 
 fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
-    let (codes, parameters, hold) = (args.codes, args.parameters, args.hold);
+    let (codes, parameters) = (args.codes, args.parameters);
     let set = read_blob(&args.params)?;
     let dataset = match args.log.as_deref().zip(args.stage.as_deref()) {
         Some((log, stage)) => {
@@ -94,7 +91,7 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
         }
     };
     let rows = dataset.rows.len();
-    let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
     let field_set = motion::field_set(&mut rng, &set);
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
@@ -102,14 +99,14 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
         let mut buffer = [0; MAX_BYTES];
         let blob = warm.to_bytes(&mut buffer)?;
         let frames = motion::uniform_frames(&mut rng, codes / 2);
-        sections.push(motion::blob_section(blob, frames, hold));
+        sections.push(motion::blob_section(blob, frames, HOLD));
         let mut buffer = [0; MAX_BYTES];
         let blob = set.to_bytes(&mut buffer)?;
-        let logged = motion::log_sections(blob, &dataset, hold)
+        let logged = motion::log_sections(blob, &dataset, HOLD)
             .ok_or("the log holds a vertical pose in place of capacitive codes")?;
         let mut uniform = |ticks| {
             let frames = motion::uniform_frames(&mut rng, ticks);
-            motion::blob_section(blob, frames, hold)
+            motion::blob_section(blob, frames, HOLD)
         };
         sections.extend(logged.iter().cloned());
         sections.push(uniform(codes));

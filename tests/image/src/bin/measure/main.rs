@@ -11,7 +11,6 @@ mod inputs;
 use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use hal_adapters::can::pose::planar_frames;
 use hal_adapters::can::{Coded, Layout, Message, SensorReceiver, Timing, sensor};
 use image::semihost::{CONSOLE, File, exit};
 use inputs::{FIELD_PROBES, PROBES, SOUND, Words, codes, decoder_of};
@@ -142,13 +141,6 @@ extern "C" fn counted_can_check(
         }
         None => false,
     }
-}
-
-/// Codes X, Y, Rz of a reading.
-#[unsafe(no_mangle)]
-#[inline(never)]
-extern "C" fn counted_can_pose(reading: &Reading, counter: u32, coded: &mut [Coded; 3]) {
-    *coded = planar_frames(reading, counter);
 }
 
 #[cfg(c_reference)]
@@ -292,7 +284,6 @@ fn main() -> ! {
     }
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     let mut coded = sensor::frames_16(&frame);
-    let mut poses = planar_frames(&reading, 0);
     // The first tick starts the sequence; from then on every frame is due.
     for first in sensor::frames_16(&RawFrame {
         sequence: 0,
@@ -306,8 +297,6 @@ fn main() -> ! {
         counted_can_code(black_box(&sent), &mut coded);
         counted_can_check(&mut receiver, black_box(&coded), 2000 * k, &mut sent);
         black_box(&sent);
-        counted_can_pose(black_box(&reading), k, &mut poses);
-        black_box(&poses);
     }
     let base = touched(|| ());
     let tick = touched(|| counted_tick(&decoder, &frame, &PlanarPose::ZERO, &mut reading));
