@@ -1,9 +1,9 @@
-//! Files that are not text: recognised by their first bytes, with the way to CSV.
+//! Files that are not text: recognised by their first bytes, each with the way to CSV.
 
-/// How far into a file binary data are looked for.
+/// Number of bytes at the start of a file that are searched for binary data.
 pub(super) const PROBE_BYTES: usize = 64 * 1024;
 
-/// The formats that logs come in, by how their files begin: what each is, and what to do.
+/// File formats by their first bytes, each with its name and a remedy.
 const FORMATS: [(&[u8], &str); 17] = [
     (
         b"PK\x03\x04",
@@ -54,7 +54,7 @@ const FORMATS: [(&[u8], &str); 17] = [
     (b"\x7fELF", "a program; name a CSV or CSV.gz log"),
 ];
 
-/// The first byte that no text has, from 0, and what the file looks like; `None` for text.
+/// The offset of the first byte that no text has, and the probable format; `None` for text.
 pub(super) fn in_text(bytes: &[u8]) -> Option<(usize, &'static str)> {
     let start = bytes.get(..PROBE_BYTES).unwrap_or(bytes);
     let control = |byte: &u8| matches!(*byte, 0..=8 | 14..=31 | 127);

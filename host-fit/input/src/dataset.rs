@@ -44,12 +44,12 @@ impl LoggedFrame {
         self.codes.temperature_mc
     }
 
-    /// All codes, where the log has those of the gaps.
+    /// All codes, if the log has codes of the gaps.
     pub fn all_codes(&self) -> Option<RawFrame> {
         self.vertical.is_none().then_some(self.codes)
     }
 
-    /// Codes of the capacitive gaps 1, 2, 3, where the log has them.
+    /// Codes of the capacitive gaps 1, 2, 3, if the log has them.
     pub fn capacitive(&self) -> Option<[i32; 3]> {
         Some(self.all_codes()?.capacitive)
     }
@@ -115,20 +115,20 @@ pub struct Movement {
 /// One log that the rows came from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogSource {
-    /// The file, as it was named.
+    /// The path, as the user gave it.
     pub path: PathBuf,
     /// Its rows in [`Dataset::rows`].
     pub rows: core::ops::Range<usize>,
-    /// How many rows were read of it, with those that are not in the dataset.
+    /// Number of rows that were read, also rows outside the dataset.
     pub rows_read: usize,
-    /// How many movements these have.
+    /// Number of movements that were read.
     pub movements_read: usize,
     /// Whether it holds the interferometers' reference; if not, [`Row::reference`] is zero.
     pub has_reference: bool,
 }
 
 impl LogSource {
-    /// How messages name it: as it was named, of an absolute path the file name alone, for reports are mailed.
+    /// Its name in messages: the path of the user, or the file name of an absolute path, because reports are mailed.
     pub fn name(&self) -> String {
         let file = self.path.file_name().filter(|_| self.path.is_absolute());
         let name = file.unwrap_or(self.path.as_os_str());
@@ -136,24 +136,24 @@ impl LogSource {
     }
 }
 
-/// Rows of one or more logs, movement after movement: all rows of short logs, and of long ones a
-/// sample of runs, each a movement by itself.
+/// Rows of one or more logs, movement after movement: all rows of short logs, and a sample of the rows of long
+/// logs. Each run of a sample is a movement.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dataset {
-    /// The rows, those of a movement next to each other.
+    /// The rows; the rows of a movement are neighbours.
     pub rows: Vec<Row>,
     /// The movements, in the order of their first rows.
     pub movements: Vec<Movement>,
-    /// The logs, in the order in which they were named.
+    /// The logs, in the order of the user.
     pub logs: Vec<LogSource>,
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
-    /// How sensitivities follow temperature: what [`Row::signal_m`] is corrected for.
+    /// Change of the sensitivities with temperature; [`Row::signal_m`] is corrected for it.
     pub temperature: Temperature<f64>,
 }
 
 impl Dataset {
-    /// How many rows and movements were read.
+    /// Number of rows and of movements that were read.
     pub fn read(&self) -> (usize, usize) {
         let logs = || self.logs.iter();
         (
@@ -162,7 +162,7 @@ impl Dataset {
         )
     }
 
-    /// Ends a log with reference: all rows and movements after those of the logs before are its own.
+    /// Ends a log with reference: it has all rows and movements since the end of the log before.
     pub fn end_log(&mut self, path: impl Into<PathBuf>) {
         let start = self.logs.last().map_or(0, |log| log.rows.end);
         let log = self.logs.len();
@@ -248,12 +248,12 @@ impl Dataset {
         Some((median_us * 1e-6).max(1e-6))
     }
 
-    /// How to name a movement: its number, after the name of its log where there are several.
+    /// Name of a movement: its number, after the name of its log if there are several logs.
     pub fn movement_name(&self, movement: &Movement) -> String {
         self.movement_named(movement.log, movement.index)
     }
 
-    /// The same of a movement by its log and its number there.
+    /// Name of a movement by its log and its number there.
     pub fn movement_named(&self, log: usize, index: i64) -> String {
         match self.logs.get(log) {
             Some(log) if self.logs.len() > 1 => format!("{}:{index}", log.name()),
@@ -261,8 +261,7 @@ impl Dataset {
         }
     }
 
-    /// The movements whose rows `keep` wants, numbered anew; logs and hash stay those of the
-    /// whole.
+    /// A dataset of the movements that `keep` accepts, numbered anew. Logs and hash do not change.
     #[must_use]
     pub fn only(&self, keep: impl Fn(&[Row]) -> bool) -> Self {
         let wanted = |movement: &Movement| keep(&self.rows[movement.rows.clone()]);
@@ -270,8 +269,7 @@ impl Dataset {
         self.where_row(|row| wanted[self.rows[row].movement])
     }
 
-    /// All rows but some; movements that lose all of theirs are left out. Logs and hash stay those of
-    /// the whole.
+    /// A dataset without some rows, and without movements that lose all rows. Logs and hash do not change.
     #[must_use]
     pub fn without(&self, rows: &[usize]) -> Self {
         let mut wanted = vec![true; self.rows.len()];

@@ -1,8 +1,8 @@
-//! A draft of `stage.toml` for logs as they are: their columns mapped where names and units
-//! are clear, and everything else as lines to fill in.
+//! A draft of `stage.toml` for given logs. It maps columns with clear names and units; everything else is a
+//! line to fill in.
 //!
-//! A line to fill in is a comment until the user writes its value, so a draft that is not finished
-//! lacks a key, and is refused.
+//! A line to fill in is a comment until the user writes its value, so an unfinished draft lacks a key and is
+//! refused.
 
 use super::log::LogError;
 use super::log::cell;
@@ -17,18 +17,18 @@ use crate::statistics::median;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What stands before a line to fill in.
+/// The start of a line to fill in.
 pub const MARK: &str = "# FILL IN: ";
-/// So many rows of a log show its period and its codes.
+/// Number of rows that are read for the period and the codes of a log.
 const ROWS_MAX: usize = 10_000;
 /// Where the comments of the drafted lines begin.
 const COMMENT_COLUMN: usize = 60;
-/// Codes of a converter of 16 bits, and of one of 24, which is meant where the log has larger ones.
+/// Codes of a converter of 16 bits and of 24 bits. Larger codes in the log mean 24 bits.
 const CODES: [[i32; 2]; 2] = [[-32_768, 32_767], [-8_388_608, 8_388_607]];
-/// Units of a time without one, and the shortest step that they have between rows: from 0.1 ms to
-/// 100 ms.
+/// Units for a time without a unit, each with the smallest step between rows that suits it: the period is then
+/// 0.1 ms to 100 ms.
 const STEPS: [(&str, f64); 4] = [("ns", 1e5), ("us", 100.0), ("ms", 0.1), ("s", 1e-4)];
-/// Sets of columns of which a log needs one.
+/// Alternative sets of columns: a log needs one of each line.
 const SETS: [&[[Quantity; 3]]; 2] = [
     &[Quantity::BEAMS, Quantity::PLANAR],
     &[Quantity::GAPS, Quantity::GAP_LENGTHS, Quantity::VERTICAL],
@@ -39,11 +39,11 @@ const SETS: [&[[Quantity; 3]]; 2] = [
 pub struct Draft {
     /// The file.
     pub text: String,
-    /// Columns of the logs that it maps.
+    /// Number of columns that it maps.
     pub mapped: usize,
     /// Names of the columns that it leaves out.
     pub ignored: Vec<String>,
-    /// How many lines must be filled in.
+    /// Number of lines to fill in.
     pub to_fill_in: usize,
 }
 
@@ -62,7 +62,7 @@ struct LogColumn {
 /// Drafts a stage file for these logs.
 ///
 /// # Errors
-/// Those of opening a log, and of a row with too few or too many cells.
+/// Errors of opening a log, and `CellCount`.
 pub fn draft<P: AsRef<Path>>(logs: &[P]) -> Result<Draft, LogError> {
     let mut columns: Vec<LogColumn> = Vec::new();
     for path in logs {
@@ -75,7 +75,7 @@ pub fn draft<P: AsRef<Path>>(logs: &[P]) -> Result<Draft, LogError> {
             }
         }
     }
-    settle(&mut columns);
+    decide_by_neighbours(&mut columns);
     let mut lines = Lines::default();
     lines.head(logs);
     lines.stage(&columns);
@@ -134,7 +134,7 @@ impl LogColumn {
         }
     }
 
-    /// What a unit of it is in m, rad, us or V, if it is one of this kind.
+    /// Its unit in m, rad, us or V, if it is a unit of this kind.
     fn scale(&self, kind: Kind) -> Option<f64> {
         self.unit.as_deref().and_then(|unit| kind.unit(unit))
     }
@@ -148,9 +148,9 @@ impl LogColumn {
     }
 }
 
-/// What columns are by those beside them: X beside Y1 and Y2 is a beam, beside Y it is that of a pose;
-/// and without a column that is called a time, one that grows is it.
-fn settle(columns: &mut [LogColumn]) {
+/// Decides by the other columns: X beside Y1 and Y2 is a beam, X beside Y belongs to a pose. Without a column that
+/// is called a time, the time is a column that grows.
+fn decide_by_neighbours(columns: &mut [LogColumn]) {
     let has = |quantity| columns.iter().any(|c| c.quantity == Some(quantity));
     let beam = has(Quantity::BeamY1) && !has(Quantity::BeamX) && !has(Quantity::Y);
     if !has(Quantity::Time) {
@@ -201,7 +201,7 @@ impl Lines {
         );
     }
 
-    /// The tables but `[log]` and `[search]`, as the stage file that ships with the program has them.
+    /// All tables but `[log]` and `[search]`, copied from the stage file that ships with the program.
     fn stage(&mut self, columns: &[LogColumn]) {
         let period_s = columns.iter().find_map(|column| {
             column.quantity.filter(|q| *q == Quantity::Time)?;
@@ -276,7 +276,7 @@ impl Lines {
                     );
                 }
                 [] => {
-                    // Of sets that hold the same, those that are not there are not missed.
+                    // Only one of alternative sets is needed.
                     let mut sets = SETS
                         .iter()
                         .filter(|sets| sets.iter().flatten().any(|q| *q == quantity));
@@ -322,7 +322,7 @@ impl Lines {
     }
 }
 
-/// A text in quotes, as TOML has it; what JSON escapes is escaped in the same way.
+/// A text in quotes for TOML, which escapes like JSON.
 fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }

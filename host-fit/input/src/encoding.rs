@@ -1,12 +1,12 @@
 //! Text in UTF-16, as spreadsheets and instruments under Windows save it, turned into UTF-8.
 
-/// The first bytes of UTF-16, and whether the low byte of a character comes first.
+/// Marks of UTF-16, and whether the low byte of a character comes first.
 const MARKS: [([u8; 2], bool); 2] = [([0xff, 0xfe], true), ([0xfe, 0xff], false)];
 
-/// Without such a mark: so many characters of Latin-1 at the start distinguish UTF-16 from binary data.
+/// Number of Latin-1 characters at the start that distinguish UTF-16 without a mark from binary data.
 const PROBE_CHARACTERS: usize = 8;
 
-/// The order of the bytes of UTF-16, and how many bytes its mark has; `None` for other text.
+/// Whether the low byte of UTF-16 comes first, and the length of its mark; `None` for other text.
 fn byte_order(bytes: &[u8]) -> Option<(bool, usize)> {
     if let Some((mark, low_first)) = MARKS.iter().find(|(mark, _)| bytes.starts_with(mark)) {
         return Some((*low_first, mark.len()));
@@ -26,15 +26,15 @@ fn byte_order(bytes: &[u8]) -> Option<(bool, usize)> {
 #[derive(Clone, Debug)]
 pub(super) struct Utf16 {
     low_first: bool,
-    /// Bytes that were taken, with the mark.
+    /// Number of bytes so far, with the mark.
     taken: usize,
-    /// Bytes of the last piece that are half a character.
+    /// Bytes at the end of the last piece that are half a character.
     rest: Vec<u8>,
 }
 
 impl Utf16 {
-    /// For a text that starts like this, if that is UTF-16, and how many bytes its mark has.
-    pub(super) fn of_start(start: &[u8]) -> Option<(Self, usize)> {
+    /// A decoder for a text with this start, and the length of its mark; `None` for other text.
+    pub(super) fn from_start(start: &[u8]) -> Option<(Self, usize)> {
         let (low_first, mark) = byte_order(start)?;
         let decoder = Self {
             low_first,
@@ -47,7 +47,7 @@ impl Utf16 {
     /// Appends the next piece to `text` as UTF-8; `is_last`: nothing follows.
     ///
     /// # Errors
-    /// The place of the first byte that is no character, from 0.
+    /// The offset of the first byte that is no character.
     pub(super) fn append(
         &mut self,
         piece: &[u8],
@@ -82,9 +82,9 @@ impl Utf16 {
 mod tests {
     use super::*;
 
-    /// The text in pieces of so many bytes; `None` if it is not UTF-16.
+    /// The text, decoded in pieces of `piece` bytes; `None` if it is not UTF-16.
     fn decoded(bytes: &[u8], piece: usize) -> Option<Result<Vec<u8>, usize>> {
-        let (mut decoder, mark) = Utf16::of_start(bytes)?;
+        let (mut decoder, mark) = Utf16::from_start(bytes)?;
         let mut text = Vec::new();
         for piece in bytes[mark..].chunks(piece) {
             if let Err(place) = decoder.append(piece, false, &mut text) {

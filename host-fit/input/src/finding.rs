@@ -124,12 +124,12 @@ impl Finding {
         (!names.is_empty()).then(|| names.join(", "))
     }
 
-    /// The movement in which it begins.
+    /// The movement of its first row.
     pub fn movement(&self) -> Option<&str> {
         self.place.as_ref().map(|place| place.movement.as_str())
     }
 
-    /// The time in the log at which it begins, us.
+    /// The time of its first row in the log, us.
     pub fn t_us(&self) -> Option<i64> {
         self.place.as_ref().map(|place| place.t_us)
     }

@@ -29,5 +29,4 @@ pub mod source;
 pub mod stage;
 pub mod statistics;
 pub mod text;
-mod unpack;
 pub mod watch;

@@ -1,13 +1,11 @@
 //! Reads logs: CSV or CSV.gz, raw codes and reference, into rows in SI units by movement.
 //!
-//! One row per servo period below a header. Which column holds what is said in
-//! [`layout`], in which units in `units.rs`, what else a table may look like at
-//! [`table::Table::open`]; a log without a column for the movement is taken apart in [`order`].
-//! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
+//! A log has one row per servo period below a header. [`layout`] names the columns, `units.rs` their units,
+//! [`table::Table::open`] the forms of a table. [`order`] separates movements in a log without a column for them.
+//! The first bytes of a file say whether it is gzip or UTF-16; its name does not matter.
 //!
-//! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
-//! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
-//! structure is wrong is always refused.
+//! Faults are refused with file, line and column ([`LogError`]). Bad cells and saturated codes can be left out and
+//! counted instead ([`BadRows::Skip`]); a wrong structure is always refused.
 
 pub mod cell;
 mod decimal;
@@ -54,25 +52,22 @@ pub enum SaturatedCodes {
     /// The row is bad: see [`BadRows`].
     #[default]
     Bad,
-    /// The row is kept: the decoder marks it.
+    /// The row is kept, and the decoder marks it.
     Keep,
 }
 
 /// Whether a log must hold the interferometers' reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReferenceUse {
-    /// It must.
+    /// It must hold it.
     #[default]
     Required,
-    /// It is read where it is there; [`crate::dataset::LogSource::has_reference`] tells.
+    /// It may hold it; see [`crate::dataset::LogSource::has_reference`].
     IfPresent,
 }
 
-/// Most rows that are held where all are: more than five hours of the servo, 1.5 GB.
-pub const ROWS_HELD_MAX: usize = 10_000_000;
-
-/// How to read logs. The default refuses what is wrong, needs the reference and holds all rows.
-#[derive(Clone, Copy, Debug, Default)]
+/// How to read logs.
+#[derive(Clone, Copy, Debug)]
 pub struct ReadOptions {
     /// What to do with bad rows.
     pub bad_rows: BadRows,
@@ -80,24 +75,28 @@ pub struct ReadOptions {
     pub saturated: SaturatedCodes,
     /// Whether the reference is needed.
     pub reference: ReferenceUse,
-    /// Length of the movements of logs that have no column for them, s; without it they end at gaps
-    /// alone.
+    /// Length of movements in logs without a column for them, s; `None`: they end only at gaps.
     pub split_s: Option<f64>,
-    /// Most rows that are held: of more the dataset is a sample. All are held if `None`, up to
-    /// [`ROWS_HELD_MAX`].
-    pub rows_max: Option<usize>,
+    /// Largest number of rows that are held; from longer logs a sample.
+    pub rows_max: usize,
     /// Shows how far the reading is, and can end it.
     pub watch: Watch<'static>,
 }
 
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self::FIT
+    }
+}
+
 impl ReadOptions {
-    /// For `fit`: of a long log a sample.
+    /// For `fit`.
     pub const FIT: Self = Self {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Bad,
         reference: ReferenceUse::Required,
         split_s: None,
-        rows_max: Some(FIT_ROWS_MAX),
+        rows_max: FIT_ROWS_MAX,
         watch: Watch::NONE,
     };
 
@@ -107,7 +106,7 @@ impl ReadOptions {
         saturated: SaturatedCodes::Keep,
         reference: ReferenceUse::IfPresent,
         split_s: None,
-        rows_max: None,
+        rows_max: FIT_ROWS_MAX,
         watch: Watch::NONE,
     };
 }
@@ -117,13 +116,13 @@ impl ReadOptions {
 pub struct LogReading {
     /// The rows of all logs, or a sample of them.
     pub dataset: Dataset,
-    /// What is odd about the logs, in their order.
+    /// Warnings of the logs, in their order.
     pub warnings: Vec<Finding>,
     /// Number of rows that were left out; the warnings say why.
     pub skipped_rows: usize,
 }
 
-/// Reads the logs, in this order, into one dataset. With `rows_max` memory does not grow with the logs.
+/// Reads the logs, in this order, into one dataset. Memory does not grow with the logs.
 ///
 /// # Errors
 /// Every variant of [`LogError`]; the first fault of the first bad log.
@@ -138,7 +137,7 @@ pub fn read<P: AsRef<Path>>(
 /// The same; `take` gets every row, with the number of its log.
 ///
 /// # Errors
-/// Those of [`read`].
+/// As [`read`].
 pub fn read_each<P: AsRef<Path>>(
     paths: &[P],
     stage: &Stage,
@@ -152,7 +151,7 @@ pub fn read_each<P: AsRef<Path>>(
 /// Reads one log that is in memory, plain or gzip; `path` only names it in errors.
 ///
 /// # Errors
-/// Those of [`read`], without those of opening the file.
+/// As [`read`], without errors of opening the file.
 pub fn read_bytes(
     bytes: &[u8],
     path: &Path,
@@ -165,7 +164,7 @@ pub fn read_bytes(
 /// The same; `take` gets every row, with the number of the log: 0.
 ///
 /// # Errors
-/// Those of [`read_bytes`].
+/// As [`read_bytes`].
 pub fn read_each_of_bytes(
     bytes: &[u8],
     path: &Path,
@@ -184,7 +183,7 @@ fn read_texts<'t>(
     mut take: impl FnMut(usize, &LogRow),
 ) -> Result<LogReading, LogError> {
     let mut reading = LogReading::default();
-    let mut sampler = Sampler::new(options.rows_max.unwrap_or(usize::MAX));
+    let mut sampler = Sampler::new(options.rows_max);
     let mut hash = Sha256::new();
     let mut logs = 0;
     for (log, text) in texts.into_iter().enumerate() {
@@ -195,10 +194,6 @@ fn read_texts<'t>(
         while let Some(row) = rows.next_row()? {
             sampler.push(row.movement, row.begins, &row.row);
             take(log, &row);
-            if options.rows_max.is_none() && sampler.rows_read() > ROWS_HELD_MAX {
-                let limit = ROWS_HELD_MAX;
-                return Err(Place::of(path, None).refuse(LogProblem::TooManyRows { limit }));
-            }
         }
         let end = rows.end()?;
         reading.skipped_rows += end.skipped_rows;
@@ -212,13 +207,13 @@ fn read_texts<'t>(
         };
         if let Some(first) = sampler.end_log(source) {
             let first = first.path.clone();
-            return Err(Place::of(path, None).refuse(LogProblem::SameLog { first }));
+            return Err(Place::new(path, None).refuse(LogProblem::SameLog { first }));
         }
         hash = end.hash.unwrap_or_default();
         logs += 1;
     }
     if logs == 0 {
-        return Err(Place::of("", None).refuse(LogProblem::NoLog));
+        return Err(Place::new("", None).refuse(LogProblem::NoLog));
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());
     reading.dataset.compensate_as_expected(&stage.temperature);

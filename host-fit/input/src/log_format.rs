@@ -6,7 +6,7 @@ use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 use std::fmt::Write;
 
-/// How a log is written.
+/// The columns and units of a log that is written.
 #[derive(Clone, Debug)]
 pub struct LogFormat {
     header: String,
@@ -50,7 +50,7 @@ impl LogFormat {
     }
 
     /// Appends a row; the reference is in the units of its columns. A temperature (m degC) of
-    /// [`MISSING_CODE`] leaves its cell empty.
+    /// [`MISSING_CODE`] gives an empty cell.
     pub fn append(
         &self,
         text: &mut String,

@@ -1,11 +1,10 @@
-//! The rows of logs that are kept while they are read: all rows of short logs, and of long ones runs
-//! of rows that follow each other, spread over all that moves.
+//! Samples the rows of logs while they are read: all rows of short logs, and runs of neighbouring rows of long
+//! logs, spread over all motion.
 //!
-//! The k-th run that moves the stage in any axis has its place at the fractional part of k times the
-//! golden ratio, and is kept while its place is below the share that is kept of its log. Where there
-//! are too many rows, the share of the log that has most of them is halved. Whatever the share, the
-//! runs that are kept are spread evenly over the log, a protocol that repeats is met in all its
-//! phases, and nothing is random. Of a log in which nothing moves, the runs at rest are kept likewise.
+//! The k-th run that moves the stage in any axis has its place at the fractional part of k times the golden ratio.
+//! It is kept while its place is below the share of its log. If there are too many rows, the share of the log with
+//! most rows is halved. The kept runs are spread evenly over the log for every share, a protocol that repeats is
+//! sampled in all its phases, and nothing is random. A log without motion is sampled in the same way.
 
 use crate::dataset::{Dataset, LogSource, Movement, Row};
 use crate::stage;
@@ -15,15 +14,14 @@ use std::ops::Range;
 
 /// Rows of a run: a second, as long as the period of the paper's motions.
 const RUN: usize = 500;
-/// Rows of a run that are looked at for whether it moves, about.
+/// About the number of rows of a run that are tested for motion.
 const LOOKED_AT: usize = 50;
-/// A run in which X, Y and Z move less, m, and Rz, Rx and Ry, rad, stands still.
+/// A run stands still if X, Y and Z move less than this, m, and Rz, Rx and Ry less than the next, rad.
 const IDLE_M: f64 = 2e-6;
 const IDLE_RAD: f64 = 20e-6;
-/// How far the place of a run moves from run to run: by the golden ratio the places of any number of
-/// runs are spread evenly.
+/// Step of the place from run to run. The golden ratio spreads the places of any number of runs evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
-/// The place of what is kept of a whole log only: the end of a movement, less than half a run.
+/// The place of less than half a run at the end of a movement, which only a whole log keeps.
 const REST: f64 = 1.0;
 
 /// Rows that follow each other in one movement.
@@ -44,9 +42,9 @@ struct Run {
 struct Log {
     /// Runs at places below this are kept.
     share: f64,
-    /// Runs so far that move, and that stand still.
+    /// Number of runs that move, and that stand still.
     counts: [usize; 2],
-    /// Rows and movements so far.
+    /// Number of rows and movements.
     rows: usize,
     movements: usize,
     /// Of all its rows.
@@ -71,16 +69,16 @@ pub(super) struct Sampler {
     rows_max: usize,
     rows: Vec<Row>,
     runs: Vec<Run>,
-    /// Those that were read, and the one that is read.
+    /// The logs that were read, and the log in hand.
     logs: Vec<Log>,
     sources: Vec<LogSource>,
-    /// The number of rows at which there are too many.
+    /// Number of rows that is too large.
     too_many: usize,
 }
 
 impl Sampler {
-    /// Nothing yet; of logs with more than `rows_max` rows in all, a quarter to half of so many are
-    /// kept.
+    /// Keeps all rows of logs with up to `rows_max` rows in all, and a quarter to half of `rows_max` rows of longer
+    /// logs.
     pub(super) const fn new(rows_max: usize) -> Self {
         Self {
             rows_max,
@@ -90,11 +88,6 @@ impl Sampler {
             sources: Vec::new(),
             too_many: rows_max.saturating_add(1),
         }
-    }
-
-    /// Rows of all logs so far.
-    pub(super) fn rows_read(&self) -> usize {
-        self.logs.iter().map(|log| log.rows).sum()
     }
 
     /// A log begins.
@@ -108,7 +101,7 @@ impl Sampler {
         });
     }
 
-    /// Takes the next row of the log: the number of its movement, and whether that begins with it.
+    /// Takes the next row of the log, with the number of its movement and whether the movement begins with it.
     pub(super) fn push(&mut self, index: i64, begins: bool, row: &Row) {
         if begins || self.runs.last().is_none_or(|run| run.rows.len() == RUN) {
             self.end_run();
@@ -136,7 +129,7 @@ impl Sampler {
         }
     }
 
-    /// The log is over. Gives the one before it with the same rows, if any.
+    /// Ends the log. Returns an earlier log with the same rows, if any.
     pub(super) fn end_log(&mut self, mut source: LogSource) -> Option<&LogSource> {
         self.end_run();
         let (last, earlier) = self.logs.split_last()?;
@@ -190,12 +183,12 @@ impl Sampler {
                 _ => break,
             }
         }
-        self.let_go();
+        self.drop_rows();
         self.too_many = (self.rows_max + 1).max(2 * self.rows.len());
     }
 
-    /// Lets go of the rows that are not kept.
-    fn let_go(&mut self) {
+    /// Drops the rows that are not kept.
+    fn drop_rows(&mut self) {
         let mut end = 0;
         self.runs.retain_mut(|run| {
             let keeps = self.logs[run.log].keeps(run);

@@ -1,7 +1,7 @@
-//! A file as bytes, read whole or piece by piece. `-` is standard input.
+//! Opens and reads files. `-` is standard input.
 
 use std::fs::File;
-use std::io::{Cursor, ErrorKind, Read};
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// The name of standard input on the command line, and in messages.
@@ -61,8 +61,8 @@ pub enum SourceProblem {
 }
 
 impl SourceProblem {
-    /// The same, of this file.
-    pub(super) fn of(self, path: &Path) -> SourceError {
+    /// The problem of this file, as an error.
+    pub(super) fn in_file(self, path: &Path) -> SourceError {
         SourceError {
             path: shown_name(path).to_path_buf(),
             problem: self,
@@ -70,21 +70,17 @@ impl SourceProblem {
     }
 }
 
-/// What the system says of a file, in the user's terms.
 impl From<std::io::Error> for SourceProblem {
     fn from(source: std::io::Error) -> Self {
         match source.kind() {
             ErrorKind::NotFound => Self::NotFound,
             ErrorKind::IsADirectory => Self::IsFolder,
-            // Sources of this module wrap problems of their own.
-            _ => source
-                .downcast()
-                .unwrap_or_else(|source| Self::Unreadable { source }),
+            _ => Self::Unreadable { source },
         }
     }
 }
 
-/// What an input is called in messages.
+/// The name of an input in messages.
 pub fn shown_name(path: &Path) -> &Path {
     let (argument, name) = STANDARD_INPUT;
     match path.as_os_str() == argument {
@@ -93,89 +89,41 @@ pub fn shown_name(path: &Path) -> &Path {
     }
 }
 
-/// A file of at most `limit_bytes`, as it is.
+/// All bytes of a file, at most `limit_bytes`.
 ///
 /// # Errors
 /// `NotFound`, `IsFolder`, `Unreadable`, `TooLarge`.
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SourceError> {
     let bytes = read_start(path, limit_bytes.saturating_add(1))?;
     if bytes.len() as u64 > limit_bytes {
-        return Err(SourceProblem::TooLarge { limit_bytes }.of(path));
+        return Err(SourceProblem::TooLarge { limit_bytes }.in_file(path));
     }
     Ok(bytes)
 }
 
-/// The first bytes of a file, as many as `most`, from standard input for `-`.
+/// The first bytes of a file, at most `most`; of standard input for `-`.
 ///
 /// # Errors
 /// `NotFound`, `IsFolder`, `Unreadable`.
 pub fn read_start(path: &Path, most: u64) -> Result<Vec<u8>, SourceError> {
     let mut bytes = Vec::new();
-    let read = Raw::open(path).and_then(|raw| Ok(raw.take(most).read_to_end(&mut bytes)?));
-    read.map_err(|problem| problem.of(path))?;
+    let read = open(path).and_then(|(file, _)| Ok(file.take(most).read_to_end(&mut bytes)?));
+    read.map_err(|problem| problem.in_file(path))?;
     Ok(bytes)
 }
 
-/// The bytes of a file as they are, counted. Errors of reading are
-/// [`SourceProblem`]s inside.
-pub(super) struct Raw<'a> {
-    file: Box<dyn Read + Send + 'a>,
-    /// Bytes that were read.
-    pub(super) read: u64,
-    /// Bytes of the file; 0 where that is not known.
-    pub(super) total: u64,
-}
-
-impl<'a> Raw<'a> {
-    /// Opens a file.
-    ///
-    /// # Errors
-    /// `NotFound`, `IsFolder`, `Unreadable`.
-    pub(super) fn open(path: &Path) -> Result<Self, SourceProblem> {
-        if path.as_os_str() == STANDARD_INPUT.0 {
-            return Ok(Self::from_reader(std::io::stdin()));
-        }
-        let file = match File::open(path) {
-            Err(_) if path.is_dir() => return Err(SourceProblem::IsFolder),
-            opened => opened?,
-        };
-        let total = file.metadata().map_or(0, |metadata| metadata.len());
-        Ok(Self {
-            total,
-            ..Self::from_reader(file)
-        })
+/// Opens a file for reading, and gives its length: 0 where it is not known.
+///
+/// # Errors
+/// `NotFound`, `IsFolder`, `Unreadable`.
+pub(super) fn open(path: &Path) -> Result<(Box<dyn Read + Send>, u64), SourceProblem> {
+    if path.as_os_str() == STANDARD_INPUT.0 {
+        return Ok((Box::new(std::io::stdin()), 0));
     }
-
-    /// What a reader gives.
-    pub(super) fn from_reader(reader: impl Read + Send + 'a) -> Self {
-        Self {
-            file: Box::new(reader),
-            read: 0,
-            total: 0,
-        }
-    }
-
-    /// The same with bytes that were taken from its start put back.
-    pub(super) fn preceded_by(self, start: Vec<u8>) -> Self {
-        Self {
-            file: Box::new(Cursor::new(start).chain(self.file)),
-            read: 0,
-            ..self
-        }
-    }
-}
-
-impl Read for Raw<'_> {
-    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        loop {
-            match self.file.read(bytes) {
-                Ok(read) => {
-                    self.read += read as u64;
-                    return Ok(read);
-                }
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(std::io::Error::other(SourceProblem::from(error))),
-            }
-        }
-    }
+    let file = match File::open(path) {
+        Err(_) if path.is_dir() => return Err(SourceProblem::IsFolder),
+        opened => opened?,
+    };
+    let length = file.metadata().map_or(0, |metadata| metadata.len());
+    Ok((Box::new(file), length))
 }

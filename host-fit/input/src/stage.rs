@@ -1,4 +1,4 @@
-//! The stage as designed: geometry, scales, and the ranges in which a fit may search.
+//! The stage as designed: geometry, scales, and search ranges.
 
 mod columns;
 mod document;
@@ -34,7 +34,7 @@ impl Range {
         Self { low, high }
     }
 
-    /// The narrowest that holds all of these.
+    /// The narrowest range that holds all of these.
     pub fn around(values: impl IntoIterator<Item = f64>) -> Self {
         let none = Self::new(f64::INFINITY, f64::NEG_INFINITY);
         values.into_iter().fold(none, |range, value| {
@@ -82,7 +82,7 @@ pub fn paper_signs<T: Neg<Output = T>>([a, [bx, by], c]: [[T; 2]; 3]) -> [[T; 2]
     [a, [-bx, by], c]
 }
 
-/// How codes of one kind of sensor are scaled, and which of them are decoded.
+/// Scale of the codes of one kind of sensor, and the range that is decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodeScale {
     /// Displacement or gap change per code, m.
@@ -91,7 +91,7 @@ pub struct CodeScale {
     pub window: CodeWindow,
 }
 
-/// Ranges in which a fit may search (Tables 3 and 5 of the paper, and the zero deviation).
+/// Search ranges: Tables 3 and 5 of the paper, and the zero deviation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchRanges {
     /// x and y of the probes A, B, C, m.
@@ -102,8 +102,8 @@ pub struct SearchRanges {
 }
 
 impl SearchRanges {
-    /// Ranges of the places and of the zero deviation, m; those of the model's terms are
-    /// [`set`](Self::set) one by one.
+    /// Ranges of the places and of the zero deviation, m. [`set`](Self::set) adds the range of each term of the
+    /// model.
     pub const fn new(places_m: [[Range; 2]; 3], delta_m: Range) -> Self {
         Self {
             places_m,
@@ -115,7 +115,7 @@ impl SearchRanges {
     /// The ranges of a term of the model for the probes A, B, C, by its key in the table
     /// `[search]`: `eta`, `theta_deg` (here in rad, from the designed theta), `a_per_m`,
     /// `b_per_rad`, `c_per_rad`.
-    pub fn of(&self, key: &str) -> Option<[Range; 3]> {
+    pub fn get(&self, key: &str) -> Option<[Range; 3]> {
         self.terms.get(key).copied()
     }
 

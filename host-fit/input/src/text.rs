@@ -1,100 +1,148 @@
-//! A file of text, piece by piece: decompressed, in UTF-8 or in another encoding that has ASCII in
-//! it, and refused by its start where it is plainly no text: a device or a damaged file may have no
-//! end.
+//! A text file, read piece by piece: decompressed if it is gzip, in UTF-8, UTF-16 or another encoding with
+//! ASCII in it. A file that is plainly not text is refused by its start, since a device or a damaged file may
+//! have no end.
 
 use super::binary;
 use super::encoding::Utf16;
-use super::source::{self, Raw, SourceError, SourceProblem};
-use super::unpack::Unpacked;
+use super::source::{self, SourceError, SourceProblem};
+use flate2::bufread::MultiGzDecoder;
 use sha2::{Digest, Sha256};
-use std::io::{Chain, Cursor, Read};
+use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
+/// First bytes of every gzip file, and of every member of one.
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// Written at the start of UTF-8 files by some programs.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+/// Compressed bytes that are read at once.
+const BUFFER_BYTES: usize = 64 * 1024;
 
 /// A text that is read piece by piece.
 pub struct TextReader<'a> {
     path: PathBuf,
-    bytes: Chain<Cursor<Vec<u8>>, Unpacked<'a>>,
-    /// Of a text in UTF-16.
+    /// The decompressed bytes.
+    bytes: Box<dyn Read + Send + 'a>,
+    is_gzip: bool,
+    /// Number of decompressed bytes that were read.
+    decompressed: usize,
+    /// Number of bytes of the file that were read, and their total: 0 where it is not known.
+    read: Arc<AtomicU64>,
+    total: u64,
     utf16: Option<Utf16>,
-    /// The mark of its encoding.
+    /// The first bytes, which were read to recognise the encoding: its mark, and the text after it.
     mark: Vec<u8>,
+    start: Vec<u8>,
     hash: Option<Sha256>,
+}
+
+/// Counts the bytes that it passes on.
+struct Counted<R> {
+    file: R,
+    read: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.file.read(bytes)?;
+        self.read.fetch_add(read as u64, Ordering::Relaxed);
+        Ok(read)
+    }
 }
 
 impl<'a> TextReader<'a> {
     /// Opens a file, plain or gzip.
     ///
     /// # Errors
-    /// Every variant of [`SourceError`] but `TooLarge` and `Utf16`.
+    /// Every variant of [`SourceError`] but `TooLarge`.
     pub fn open(path: &Path) -> Result<Self, SourceError> {
-        let raw = Raw::open(path).map_err(|problem| problem.of(path))?;
-        Self::new(raw, path)
+        let opened = source::open(path).and_then(|(file, total)| Self::new(file, total, path));
+        opened.map_err(|problem| problem.in_file(path))
     }
 
-    /// The text that a reader gives, as bytes in memory do, plain or gzip; `path` is only named in errors.
+    /// The text that a reader gives, plain or gzip, such as bytes in memory; `path` only names it in errors.
     ///
     /// # Errors
-    /// `Binary`, `Unreadable`, and those of gzip.
+    /// As [`Self::open`], without errors of opening.
     pub fn from_reader(reader: impl Read + Send + 'a, path: &Path) -> Result<Self, SourceError> {
-        Self::new(Raw::from_reader(reader), path)
+        Self::new(reader, 0, path).map_err(|problem| problem.in_file(path))
     }
 
-    fn new(raw: Raw<'a>, path: &Path) -> Result<Self, SourceError> {
-        Self::probed(raw, path).map_err(|problem| problem.of(path))
-    }
-
-    fn probed(raw: Raw<'a>, path: &Path) -> Result<Self, SourceProblem> {
-        let mut unpacked = Unpacked::new(raw)?;
-        let mut mark = Vec::new();
-        (&mut unpacked)
-            .take(binary::PROBE_BYTES as u64)
-            .read_to_end(&mut mark)?;
-        let (utf16, bytes) = Utf16::of_start(&mark).unzip();
-        let is_marked = mark.starts_with(BYTE_ORDER_MARK);
-        let start =
-            mark.split_off(bytes.unwrap_or(if is_marked { BYTE_ORDER_MARK.len() } else { 0 }));
+    fn new(
+        mut file: impl Read + Send + 'a,
+        total: u64,
+        path: &Path,
+    ) -> Result<Self, SourceProblem> {
+        // A pipe may give its first two bytes one at a time.
+        let mut magic = Vec::new();
+        (&mut file).take(2).read_to_end(&mut magic)?;
+        let is_gzip = magic == GZIP_MAGIC;
+        let read = Arc::new(AtomicU64::new(0));
+        let whole = Counted {
+            file: Cursor::new(magic).chain(file),
+            read: Arc::clone(&read),
+        };
         let mut text = Self {
             path: source::shown_name(path).to_path_buf(),
-            bytes: Cursor::new(start.clone()).chain(unpacked),
-            utf16: utf16.clone(),
-            mark,
+            bytes: match is_gzip {
+                true => Box::new(MultiGzDecoder::new(BufReader::with_capacity(
+                    BUFFER_BYTES,
+                    whole,
+                ))),
+                false => Box::new(whole),
+            },
+            is_gzip,
+            decompressed: 0,
+            read,
+            total,
+            utf16: None,
+            mark: Vec::new(),
+            start: Vec::new(),
             hash: None,
         };
-        let start = text.decoded(start, false)?;
-        text.utf16 = utf16;
-        match binary::in_text(&start) {
+        let mut start = text.piece(binary::PROBE_BYTES)?;
+        let utf16 = Utf16::from_start(&start);
+        let mark = match &utf16 {
+            Some((_, bytes)) => *bytes,
+            None if start.starts_with(BYTE_ORDER_MARK) => BYTE_ORDER_MARK.len(),
+            None => 0,
+        };
+        text.start = start.split_off(mark);
+        text.mark = start;
+        text.utf16 = utf16.map(|(decoder, _)| decoder);
+        let decoded = decoded(&mut text.utf16.clone(), &text.start, false)?;
+        match binary::in_text(&decoded) {
             None => Ok(text),
             Some((offset, looks_like)) => Err(SourceProblem::Binary { offset, looks_like }),
         }
     }
 
-    /// The next piece of the text in UTF-8.
-    fn decoded(&mut self, piece: Vec<u8>, is_last: bool) -> Result<Vec<u8>, SourceProblem> {
-        let Some(decoder) = &mut self.utf16 else {
-            return Ok(piece);
-        };
-        let mut text = Vec::new();
-        let decoded = decoder.append(&piece, is_last, &mut text);
-        decoded.map_err(|offset| SourceProblem::Utf16 { offset })?;
-        Ok(text)
-    }
-
-    fn next(&mut self, bytes: usize) -> Result<Option<Vec<u8>>, SourceProblem> {
-        let mut piece = Vec::with_capacity(bytes);
-        (&mut self.bytes)
-            .take(bytes as u64)
-            .read_to_end(&mut piece)?;
-        if let Some(hash) = &mut self.hash {
-            hash.update(&piece);
+    /// The next decompressed bytes; empty at the end.
+    fn piece(&mut self, bytes: usize) -> Result<Vec<u8>, SourceProblem> {
+        let mut piece = std::mem::take(&mut self.start);
+        if piece.is_empty() {
+            piece.reserve(bytes);
+            let read = (&mut self.bytes).take(bytes as u64).read_to_end(&mut piece);
+            self.decompressed += piece.len();
+            read.map_err(|error| self.problem(error))?;
         }
-        let is_last = piece.is_empty();
-        Ok(Some(self.decoded(piece, is_last)?).filter(|_| !is_last))
+        Ok(piece)
     }
 
-    /// Goes on with the hash of all that is read: of the decompressed file, as it is encoded.
+    /// An error of the file, or of the gzip data in it.
+    fn problem(&self, source: std::io::Error) -> SourceProblem {
+        let bytes = self.decompressed;
+        match source.kind() {
+            ErrorKind::UnexpectedEof if self.is_gzip => SourceProblem::GzipCut { bytes },
+            ErrorKind::InvalidInput | ErrorKind::InvalidData if self.is_gzip => {
+                SourceProblem::GzipDamaged { bytes, source }
+            }
+            _ => source.into(),
+        }
+    }
+
+    /// Goes on with a hash: of all decompressed bytes, before they are decoded.
     pub fn with_hash(self, mut hash: Sha256) -> Self {
         hash.update(&self.mark);
         Self {
@@ -108,23 +156,75 @@ impl<'a> TextReader<'a> {
         self.hash
     }
 
-    /// What the file is called in messages.
+    /// The name of the file in messages.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How many bytes of the file were read, and how many it has; 0 where that is not known.
+    /// Number of bytes of the file that were read, and their total; 0 where it is not known.
     pub fn progress(&self) -> (u64, u64) {
-        self.bytes.get_ref().1.progress()
+        (self.read.load(Ordering::Relaxed), self.total)
     }
 
-    /// Appends about `bytes` more bytes of text; `false` at the end.
+    /// Appends about `bytes` more bytes of text in UTF-8; `false` at the end.
     ///
     /// # Errors
-    /// `Unreadable`, `Binary`, `Utf16`, and those of gzip.
+    /// `Unreadable`, `Utf16`, `GzipCut`, `GzipDamaged`.
     pub fn append(&mut self, text: &mut Vec<u8>, bytes: usize) -> Result<bool, SourceError> {
-        let more = self.next(bytes).map_err(|problem| problem.of(&self.path))?;
-        text.extend_from_slice(more.as_deref().unwrap_or_default());
-        Ok(more.is_some())
+        let piece = self.piece(bytes);
+        let piece = piece.map_err(|problem| problem.in_file(&self.path))?;
+        if let Some(hash) = &mut self.hash {
+            hash.update(&piece);
+        }
+        let is_last = piece.is_empty();
+        let decoded = decoded(&mut self.utf16, &piece, is_last);
+        text.extend(decoded.map_err(|problem| problem.in_file(&self.path))?);
+        Ok(!is_last)
+    }
+}
+
+/// A piece of a text in UTF-8.
+fn decoded(
+    utf16: &mut Option<Utf16>,
+    piece: &[u8],
+    is_last: bool,
+) -> Result<Vec<u8>, SourceProblem> {
+    let Some(decoder) = utf16 else {
+        return Ok(piece.to_vec());
+    };
+    let mut text = Vec::new();
+    let decoded = decoder.append(piece, is_last, &mut text);
+    decoded.map_err(|offset| SourceProblem::Utf16 { offset })?;
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    /// Has no more to give.
+    struct Failing(ErrorKind);
+
+    impl Read for Failing {
+        fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+            Err(self.0.into())
+        }
+    }
+
+    #[test]
+    fn a_fault_of_the_system_is_not_reported_as_damaged_gzip_data() {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
+        encoder.write_all(&[b'a'; 1000]).expect("in memory");
+        let packed = encoder.finish().expect("in memory");
+        for kind in [ErrorKind::OutOfMemory, ErrorKind::PermissionDenied] {
+            let half = packed[..500].chain(Failing(kind));
+            let opened = TextReader::from_reader(half, Path::new("log"));
+            let problem = opened.map(|_| ()).expect_err("refused").problem;
+            assert!(
+                matches!(&problem, SourceProblem::Unreadable { source } if source.kind() == kind),
+                "{problem}"
+            );
+        }
     }
 }

@@ -1,8 +1,8 @@
-//! How a program watches its long work: it is told how far the work is, and can end it.
+//! Long work reports its progress to the program around it, which can end it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What nobody sets.
+/// A flag that nobody sets.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// A flag that ends long work, and a function that shows how far it is.
@@ -10,8 +10,8 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 pub struct Watch<'a> {
     /// Set where the work should end: by Ctrl-C, or by another thread.
     pub stop: &'a AtomicBool,
-    /// Takes the name of the work, how many of its steps are done, and their number. All steps are done
-    /// where the work ends, for whatever reason.
+    /// Takes the name of the work, the number of steps done, and their total. All steps count as done when the work
+    /// ends, for any reason.
     pub report: fn(&'static str, u64, u64),
 }
 
@@ -35,7 +35,7 @@ impl Watch<'_> {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Begins a piece of work. Nothing is reported where the number of steps is not known: 0.
+    /// Begins a piece of work. Without a known number of steps (0) it reports nothing.
     pub const fn begin(&self, work: &'static str, steps: u64) -> Progress {
         Progress {
             work,

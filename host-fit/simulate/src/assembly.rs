@@ -95,7 +95,7 @@ impl Assembly {
 
 /// The search ranges of eta; the designed value where a stage has none.
 fn etas(stage: &Stage) -> [Range; 3] {
-    stage.search.of("eta").unwrap_or([Range::new(1.0, 1.0); 3])
+    stage.search.get("eta").unwrap_or([Range::new(1.0, 1.0); 3])
 }
 
 fn inner(range: Range, random: &mut Stream) -> f64 {
@@ -166,7 +166,7 @@ mod tests {
                 let eta = slope(probe, sensed);
                 assert!(etas(&stage)[i].contains(eta), "seed {seed}: {eta}");
                 let theta = (slope(probe, across) / eta).atan();
-                let thetas = stage.search.of("theta_deg").expect("a range");
+                let thetas = stage.search.get("theta_deg").expect("a range");
                 assert!(thetas[i].contains(theta), "seed {seed}: {theta}");
             }
         }

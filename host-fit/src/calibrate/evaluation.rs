@@ -58,7 +58,7 @@ impl Evaluation {
     /// How logs are read: the reference is needed, and the decoder marks saturated codes.
     pub const OPTIONS: ReadOptions = ReadOptions {
         reference: ReferenceUse::Required,
-        rows_max: Some(ROWS_MAX),
+        rows_max: ROWS_MAX,
         ..ReadOptions::DECODE
     };
 

@@ -132,7 +132,7 @@ mod tests {
     fn a_report_says_how_much_of_a_long_log_is_drawn() {
         let stage = shipped::stage();
         let options = ReadOptions {
-            rows_max: Some(50_000),
+            rows_max: 50_000,
             ..ReadOptions::FIT
         };
         let reading = read_bytes(LOG_GZ, "log".as_ref(), &stage, &options).expect("sound");

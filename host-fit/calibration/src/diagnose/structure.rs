@@ -135,7 +135,7 @@ impl Drawing {
     fn new(stage: &Stage) -> Self {
         let geometry = Parameters::designed(stage).geometry();
         let (mut eta, mut tolerances) = ([1.0; 3], [Vector::from(TOLERANCES); 3]);
-        for (probe, range) in stage.search.of("eta").into_iter().flatten().enumerate() {
+        for (probe, range) in stage.search.get("eta").into_iter().flatten().enumerate() {
             eta[probe] = 0.5 * (range.low + range.high);
             tolerances[probe][0] = range.width() / (eta[probe] * 12f64.sqrt());
         }

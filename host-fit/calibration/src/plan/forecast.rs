@@ -14,7 +14,7 @@ use runtime::model::Sensitivity;
 /// magnets, with sensitivities in the middle of the search range.
 fn designed(stage: &Stage) -> FieldParameters {
     let geometry = stage.geometry();
-    let etas = stage.search.of("eta");
+    let etas = stage.search.get("eta");
     let eta = etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high)));
     let places = stage.places_m();
     let sensitivity = [0, 1, 2].map(|k| {

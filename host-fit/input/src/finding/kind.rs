@@ -130,13 +130,13 @@ kinds! {
     FileCut { file: String, line: usize } => Code::FileCut;
     /// Movements are separated by the time, every `split_s` seconds and after a gap of more than `gap_rows`.
     MovementsByTime { file: String, movements: usize, split_s: Option<f64>, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
-    /// Voltages are so many codes from whole ones on average.
+    /// Mean difference of voltages from whole codes.
     BetweenCodes { file: String, mean_codes: f64 } => Code::BetweenCodes, *mean_codes, "codes";
     /// A fit uses `taken` rows in `runs` of rows that follow each other.
     Excerpt { rows: usize, taken: usize, runs: usize } => Code::Excerpt, *taken as f64, "rows";
     /// Rows with the same fault, and the cell of the first.
     RowsSkipped { file: String, reason: &'static str, rows: usize, line: usize, column: usize, name: String } => Code::RowsSkipped, *rows as f64, "rows";
-    /// Movements of which all rows are skipped.
+    /// Movements without a kept row.
     MovementsSkipped { file: String, movements: Vec<i64>, rows: usize } => Code::RowsSkipped, *rows as f64, "rows";
 
     // Of the times and the signals of a log.
@@ -146,7 +146,7 @@ kinds! {
     UnevenTimes { rms_us: f64 } => Code::Jitter, *rms_us, "us";
     /// Rows are farther apart than servo periods; `periods` if that is a whole number.
     OtherRate { period_us: f64, servo_us: f64, periods: Option<f64> } => Code::Jitter, *period_us, "us";
-    /// Movements in which nothing moves.
+    /// Movements without motion.
     IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
     /// A channel repeats a value, or shows its noise alone, while it should move.
     Stands { rows: usize, share: f64, longest_s: f64 } => Code::Stuck, *longest_s, "s";
@@ -195,7 +195,7 @@ kinds! {
     AtLimit { parameter: String, shown: (f64, &'static str), value: f64, unit: &'static str } => Code::TermsAtLimit, *value, *unit;
     /// So many of the vertical terms do.
     VerticalAtLimit { parameters: usize } => Code::TermsAtLimit, *parameters as f64, "";
-    /// Movements of which a draw has no row.
+    /// Movements without a row in a draw.
     MovementsMissed { movements: Vec<String> } => Code::RowsMissing, movements.len() as f64, "movements";
     /// The largest error, too large for noise.
     WildRow { micro: f64, unit: &'static str, ratio: f64 } => Code::Outliers, *micro, *unit;
@@ -203,7 +203,7 @@ kinds! {
     // Of the range and the temperature.
     /// An axis moves otherwise than `[motion]` declares, to either side.
     OtherMotion { micro: f64, service_micro: f64, unit: &'static str, is_scale: bool } => Code::OutOfRange, *micro, *unit;
-    /// Rows beyond the range in which a blob was calibrated.
+    /// Rows beyond the calibrated range of a blob.
     BeyondRange { rows: usize, of: usize } => Code::OutOfRange, *rows as f64, "rows";
     /// k or h of Hall A, B, C with their standard errors, %/K, and where they are from.
     Coefficients { sensor: usize, percent_per_k: [[f64; 2]; 3], zero_c: f64, span_k: f64, is_field: bool, deviations: Option<f64> } => Code::Temperature, *span_k, "K";

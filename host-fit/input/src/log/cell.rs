@@ -3,35 +3,35 @@
 use super::decimal;
 use crate::stage::CodeScale;
 
-/// What is wrong with one cell.
+/// A fault of one cell.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CellFault {
-    /// Nothing in it.
+    /// It is empty.
     #[error("the cell is empty; fill it in or remove the row")]
     Empty,
-    /// Not a number.
+    /// It holds no number.
     #[error(
         "\"{text}\" is not a number; correct it or remove the row{}",
         comma_hint(text)
     )]
     NotANumber {
-        /// What is there, shortened.
+        /// Its text, shortened.
         text: String,
     },
-    /// A decimal point in a table whose first rows have decimal commas.
+    /// A decimal point, after decimal commas in the first rows.
     #[error(
         "\"{text}\" has a decimal point, where the first rows of the log have decimal commas; write all numbers alike, without marks between thousands"
     )]
     DecimalPoint {
-        /// What is there, shortened.
+        /// Its text, shortened.
         text: String,
     },
-    /// A time that is written in another way than the first of the log.
+    /// A time in another form than the first time of the log.
     #[error(
-        "\"{text}\" is a time written in another way than the first of the log; write all as numbers, all as dates and times with a zone, or all without"
+        "\"{text}\" is a time written in another way than the first time of the log; write all as numbers, all as dates and times with a zone, or all without"
     )]
     OtherTime {
-        /// What is there, shortened.
+        /// Its text, shortened.
         text: String,
     },
     /// NaN.
@@ -40,7 +40,7 @@ pub enum CellFault {
     /// An infinity.
     #[error("\"{text}\" is infinite; remove the row")]
     Infinite {
-        /// What is there.
+        /// Its text.
         text: String,
     },
     /// A fraction where codes or indices are whole.
@@ -79,7 +79,7 @@ pub enum CellFault {
     },
     /// A code at the end of the converter's range.
     #[error(
-        "code {code} is at the converter's rail: the sensor is saturated; record the movement again, or leave such rows out with --bad-rows skip"
+        "code {code} is at the converter's rail: the sensor is saturated; record the movement again, or skip such rows with --bad-rows skip"
     )]
     Saturated {
         /// The code.
@@ -88,7 +88,7 @@ pub enum CellFault {
 }
 
 impl CellFault {
-    /// Why a row with such a cell is left out, in words.
+    /// The reason to leave a row out, in words.
     pub(super) const fn reason(&self) -> &'static str {
         match self {
             Self::Empty => "an empty cell",
@@ -114,10 +114,10 @@ fn comma_hint(text: &str) -> &'static str {
     }
 }
 
-/// Largest index or time that is kept exactly on its way through `f64`.
+/// Largest index or time that is exact in `f64`.
 pub const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
 
-/// How much of a bad cell an error shows, in characters.
+/// Most characters of a bad cell in an error.
 const SHOWN_CHARS: usize = 40;
 
 /// A cell's text for a message: valid UTF-8, no control characters, not too long.
@@ -143,7 +143,7 @@ pub struct Cell<'a> {
 /// A converter's code.
 pub(super) struct Code {
     pub(super) code: i32,
-    /// How far the cell is from a whole code; 0 in a column of codes.
+    /// Difference from a whole code; 0 in a column of codes.
     pub(super) fraction: f64,
     pub(super) is_saturated: bool,
 }
@@ -152,8 +152,7 @@ pub(super) struct Code {
 const PLAIN_DIGITS: usize = 15;
 
 impl Cell<'_> {
-    /// The number in a cell of nothing but a few digits, as most cells of codes are; with a minus sign
-    /// or without.
+    /// The number in a cell of a few digits, with or without a minus sign: most cells of codes are such.
     #[inline]
     fn plain(self) -> Option<i64> {
         let (digits, sign) = match self.text {
@@ -207,7 +206,7 @@ impl Cell<'_> {
         }
     }
 
-    /// A whole number; `12.0` counts as one. `what` says what the column holds.
+    /// A whole number, also `12.0`. `what` names the content of the column.
     #[inline]
     pub fn whole(self, what: &'static str) -> Result<i64, CellFault> {
         if let Some(number) = self.plain() {
@@ -267,7 +266,7 @@ mod tests {
 
     impl<'a> Cell<'a> {
         /// With decimal points.
-        pub(in crate::log) const fn of(text: &'a str) -> Self {
+        pub(in crate::log) const fn new(text: &'a str) -> Self {
             Self {
                 text: text.as_bytes(),
                 decimal_commas: false,
@@ -282,7 +281,7 @@ mod tests {
         let others = ". - + e5 1e 1_0 0x1 --1 1,5 nan inf -Infinity infinit";
         let split = numbers.split_whitespace().chain(others.split(' '));
         for text in split.chain(["", "1 2"]) {
-            let have = Cell::of(text).number();
+            let have = Cell::new(text).number();
             match text.parse::<f64>() {
                 Ok(number) if number.is_finite() => {
                     assert_eq!(have, Ok(number), "{text}");

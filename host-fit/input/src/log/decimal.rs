@@ -1,10 +1,9 @@
-//! Decimal commas, in tables whose cells are separated by semicolons or tabs.
+//! Decimal commas, in tables with semicolons or tabs between cells.
 
 /// Whether the rows in `bytes`, without the header, have decimal commas.
 ///
-/// One number at least must be readable in no other way, as `0,5` and `12,3456` are while `1,234`
-/// may have a comma between thousands, and none may have a decimal point or several commas: a
-/// factor of a thousand is not guessed.
+/// At least one number must allow no other reading, such as `0,5` and `12,3456`; in `1,234` the comma may separate
+/// thousands. No number may have a decimal point or several commas: a factor of a thousand is not guessed.
 pub(super) fn has_decimal_commas(bytes: &[u8], separator: u8) -> bool {
     if separator == b',' || !bytes.contains(&b',') {
         return false;
@@ -34,7 +33,7 @@ fn unquoted(cell: &[u8]) -> &[u8] {
     inside.strip_suffix(b"\"").unwrap_or(inside).trim_ascii()
 }
 
-/// Without a sign.
+/// The number without its sign.
 fn digits(number: &[u8]) -> &[u8] {
     match number {
         [b'-' | b'+', rest @ ..] => rest,
@@ -42,7 +41,7 @@ fn digits(number: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether a cell has digits, and nothing but what a number may have.
+/// Whether a cell has digits, and only characters of numbers.
 pub(super) fn is_number(cell: &[u8]) -> bool {
     let cell = cell.trim_ascii();
     let part = |b: &u8| b.is_ascii_digit() || b",.+-eE".contains(b);

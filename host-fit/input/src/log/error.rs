@@ -20,7 +20,7 @@ pub struct Place {
 
 impl Place {
     /// A file, or a line of it.
-    pub fn of(path: impl Into<PathBuf>, line: impl Into<Option<usize>>) -> Box<Self> {
+    pub fn new(path: impl Into<PathBuf>, line: impl Into<Option<usize>>) -> Box<Self> {
         Box::new(Self {
             path: path.into(),
             line: line.into(),
@@ -28,7 +28,7 @@ impl Place {
         })
     }
 
-    /// What is wrong here, as an error.
+    /// A problem at this place, as an error.
     pub fn refuse(self: Box<Self>, problem: LogProblem) -> LogError {
         LogError {
             place: self,
@@ -60,28 +60,28 @@ impl Display for Place {
 #[derive(Debug, thiserror::Error)]
 #[error("{place}{}{problem}", if place.path.as_os_str().is_empty() { "" } else { ": " })]
 pub struct LogError {
-    /// Where.
+    /// Its place.
     pub place: Box<Place>,
-    /// What.
+    /// The problem.
     pub problem: LogProblem,
 }
 
 impl From<SourceError> for LogError {
     fn from(SourceError { path, problem }: SourceError) -> Self {
-        Place::of(path, None).refuse(problem.into())
+        Place::new(path, None).refuse(problem.into())
     }
 }
 
-/// What is wrong with a log.
+/// A fault of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogProblem {
     /// No log was named.
     #[error("no log was named; name one or more CSV or CSV.gz files")]
     NoLog,
-    /// The file cannot be read, or is no text.
+    /// The file cannot be read, or is not text.
     #[error(transparent)]
     Source(#[from] SourceProblem),
-    /// Nothing in its first mebibyte, or only comments and blank lines.
+    /// Its first mebibyte is empty, or only comments and blank lines.
     #[error(
         "the log is empty, or its first mebibyte is only comments; record it again or name another file"
     )]
@@ -102,7 +102,7 @@ pub enum LogProblem {
         /// The start of the line.
         text: String,
     },
-    /// More columns than any log has.
+    /// Too many columns.
     #[error(
         "the header has more than {limit} columns; name another file, or leave out the columns that are not needed"
     )]
@@ -110,15 +110,7 @@ pub enum LogProblem {
         /// The most that are read.
         limit: usize,
     },
-    /// More rows than are held at once.
-    #[error(
-        "more than {limit} rows in all, the most that are held at once; name a part of the logs"
-    )]
-    TooManyRows {
-        /// The most.
-        limit: usize,
-    },
-    /// A line without an end.
+    /// A line is too long.
     #[error(
         "the line is longer than {limit_bytes} bytes, the most that is read; name a log with a row in each line"
     )]
@@ -126,7 +118,7 @@ pub enum LogProblem {
         /// The most bytes.
         limit_bytes: usize,
     },
-    /// More movements than are counted.
+    /// Too many movements.
     #[error(
         "more than {limit} movements, the most that a log may have; check the movement column, or split the log"
     )]
@@ -134,7 +126,7 @@ pub enum LogProblem {
         /// The most.
         limit: usize,
     },
-    /// A column that is needed is not there.
+    /// A column is missing.
     #[error(
         "the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml"
     )]
@@ -144,7 +136,7 @@ pub enum LogProblem {
         /// The key in the `[log]` table.
         key: &'static str,
     },
-    /// A column that nothing maps.
+    /// A column is not known.
     #[error(
         "it is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml, which `host-fit init` drafts (known columns: {known})"
     )]
@@ -154,7 +146,7 @@ pub enum LogProblem {
         /// The columns that are known, by name.
         known: String,
     },
-    /// A column without a name.
+    /// A column has no name.
     #[error("it has no name; name it, or remove the separator too many")]
     UnnamedColumn,
     /// Two columns for one quantity.
@@ -163,7 +155,7 @@ pub enum LogProblem {
         /// The other column, from 1.
         first: usize,
     },
-    /// A quantity whose unit is known from nowhere.
+    /// A quantity has no unit.
     #[error(
         "it has no unit; write one of {units} into its name, as in `{name} [..]`, or give it with `{key} = {{ column = \"{name}\", unit = \"..\" }}` in the [log] table of stage.toml"
     )]
@@ -175,7 +167,7 @@ pub enum LogProblem {
         /// The key in the `[log]` table.
         key: &'static str,
     },
-    /// A voltage where the parameters are for codes.
+    /// A column holds voltages, and the parameters are for codes.
     #[error(
         "it is a voltage, and the parameters are for the converter's codes; give its `volts_per_count` (V) in the [{table}] table of stage.toml"
     )]
@@ -183,7 +175,7 @@ pub enum LogProblem {
         /// The table of its converter.
         table: &'static str,
     },
-    /// Two units for one column.
+    /// A column has two units.
     #[error(
         "it has the unit {below} in the row below the header, and another by its name or the [log] table of stage.toml; correct one of them"
     )]
@@ -191,7 +183,7 @@ pub enum LogProblem {
         /// The unit in the row below the header.
         below: String,
     },
-    /// `--split` for a log that has movements.
+    /// `--split` for a log with a column for the movement.
     #[error("the log has a column for the movement, so --split does not apply; leave it out")]
     SplitWithMovements,
     /// Two sets of columns hold the same quantities.
@@ -199,9 +191,9 @@ pub enum LogProblem {
         "both `{one}` and `{other}` are there and hold the same thing; drop one set with `ignore = [...]` in the [log] table of stage.toml"
     )]
     AmbiguousColumns {
-        /// A column of the one set.
+        /// A column of one set.
         one: String,
-        /// A column of the other.
+        /// A column of the other set.
         other: String,
     },
     /// A line with more or fewer cells than the header.
@@ -225,7 +217,7 @@ pub enum LogProblem {
     /// A cell that cannot be used.
     #[error(transparent)]
     Cell(#[from] CellFault),
-    /// A row is earlier than the one above.
+    /// A row is earlier than the row above.
     #[error(
         "time runs backwards, from {before_us} us to {t_us} us; sort the rows by time, or give each run a movement number of its own"
     )]
@@ -235,7 +227,7 @@ pub enum LogProblem {
         /// Time of this row, us.
         t_us: i64,
     },
-    /// A row has the time of the one above.
+    /// A row has the time of the row above.
     #[error("the row repeats the time {t_us} us of the row above; remove the duplicate")]
     DuplicatedRow {
         /// The time, us.
@@ -255,7 +247,7 @@ pub enum LogProblem {
         /// The log with the same rows.
         first: PathBuf,
     },
-    /// Nothing is left after bad rows were skipped.
+    /// All rows are bad.
     #[error(
         "every row is bad and was left out, {rows} in all (the first: {first}); record the log again"
     )]

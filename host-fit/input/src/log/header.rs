@@ -1,4 +1,4 @@
-//! The header of a table: which cell of a row holds what.
+//! The header of a table: the cell of each quantity.
 
 use super::ReferenceUse;
 use super::cell::shown;
@@ -7,10 +7,10 @@ use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
 use super::table::Head;
 use crate::stage::Stage;
 
-/// A cell of each row that is read.
+/// The cell of a quantity in each row.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// Which cell, from 0.
+    /// Number of the cell, from 0.
     pub cell: usize,
     /// m, rad, us or codes per unit.
     pub scale: f64,
@@ -22,7 +22,7 @@ pub type Set = ([Quantity; 3], [Source; 3]);
 /// The columns of one log.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Columns {
-    /// `None` where gaps in the time separate the movements.
+    /// `None` if gaps in the time separate the movements.
     pub(super) movement: Option<Source>,
     pub(super) time: Source,
     pub(super) hall: [Source; 3],
@@ -34,12 +34,12 @@ pub(super) struct Columns {
     pub(super) temperature: [Option<Source>; 2],
 }
 
-/// What to do with columns that the layout does not know.
+/// The treatment of columns that the layout does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnknownColumns {
     /// Refuse the table: a misspelt name would be ignored without a word.
     Refuse,
-    /// Leave them out: an instrument may record more than is asked for.
+    /// Leave them out: an instrument may record more than is needed.
     LeaveOut,
 }
 
@@ -47,7 +47,7 @@ pub enum UnknownColumns {
 pub struct Header<'a> {
     table: &'a Head,
     layout: &'a LogLayout,
-    /// Where each quantity is that is there.
+    /// The cell of each quantity that the table has.
     sources: [Option<Source>; Quantity::ALL.len()],
 }
 
@@ -127,12 +127,12 @@ impl<'a> Header<'a> {
         Ok(header)
     }
 
-    /// What is wrong with the header as a whole, as an error.
+    /// A problem of the whole header, as an error.
     fn refused(&self, problem: LogProblem) -> LogError {
-        Place::of(&self.table.path, self.table.line).refuse(problem)
+        Place::new(&self.table.path, self.table.line).refuse(problem)
     }
 
-    /// What a column holds, and m, rad, us or codes per unit; `None` if it is to be left out.
+    /// The quantity of a column, and m, rad, us or codes per unit; `None` if the column is left out.
     fn source(&self, cell: usize, name: &str) -> Result<Option<(Quantity, f64)>, LogProblem> {
         let below = self.table.unit(cell);
         let (quantity, unit) = match self.layout.meaning(name) {
@@ -180,23 +180,23 @@ impl<'a> Header<'a> {
         }
     }
 
-    /// Whether the unit below the header is another than that of the column: it is of the
-    /// quantity's kind, and so is the scale of the column that of a unit.
+    /// Whether the unit below the header contradicts the column: it is a unit of the same kind, and so is the scale of
+    /// the column.
     fn disagrees(&self, quantity: Quantity, scale: f64, below: &str) -> bool {
         let kind = quantity.kind();
         match (kind, kind.unit(below)) {
             (_, None) => false,
             (Kind::Code, Some(_)) => self.layout.scale(quantity, below) != Ok(scale),
-            (_, Some(unit)) => unit != scale.abs() && kind.has_unit_of(scale.abs()),
+            (_, Some(unit)) => unit != scale.abs() && kind.has_unit(scale.abs()),
         }
     }
 
-    /// Where a quantity is, if the table has it.
+    /// The cell of a quantity, if the table has it.
     pub fn find(&self, quantity: Quantity) -> Option<Source> {
         self.sources[quantity as usize]
     }
 
-    /// The cells of the quantities, or an error that names the first missing one.
+    /// The cells of the quantities, or an error that names the first missing column.
     pub fn all<const N: usize>(&self, quantities: [Quantity; N]) -> Result<[Source; N], LogError> {
         let mut sources = [Source {
             cell: 0,
@@ -213,7 +213,7 @@ impl<'a> Header<'a> {
         Ok(sources)
     }
 
-    /// The cells of the one that is there of sets that hold the same, of the first if none is.
+    /// The cells of the first of these alternative sets that the table has; of the first set if it has none.
     ///
     /// # Errors
     /// `AmbiguousColumns`, `MissingColumn`.

@@ -1,4 +1,4 @@
-//! Which column of a log holds what, and in which unit.
+//! The columns of a log: quantity, default name, unit.
 //!
 //! | key in `[log]` | default column | holds |
 //! |---|---|---|
@@ -11,12 +11,12 @@
 //! | `z`, `rx`, `ry` | `z_m`, `rx_rad`, `ry_rad` | vertical pose, in place of the codes |
 //! | `hall_a`, `hall_b`, `hall_c` | `hall_a_cnt`, `hall_b_cnt`, `hall_c_cnt` | Hall codes |
 //!
-//! A column that `[log]` leaves to its default is also known by its key or by the default name
-//! with another unit, in any of the spellings of `units.rs`: `ifm_x [um]`, `X/mm`, `Time (s)`.
+//! A column that `[log]` does not name is also known by its key, or by its default name with another unit in any
+//! spelling of `units.rs`: `ifm_x [um]`, `X/mm`, `Time (s)`.
 
 use super::units;
 
-/// What the numbers of a column are.
+/// The kind of the numbers in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A whole number that names something.
@@ -31,9 +31,9 @@ pub enum Kind {
     Code,
 }
 
-/// All that is known of the columns that hold a quantity.
+/// A row of the table of quantities.
 #[derive(Debug)]
-struct StoredPosterior {
+struct Entry {
     /// Key in the table `[log]` of `stage.toml`.
     key: &'static str,
     /// Its column in a log, unless `[log]` names another.
@@ -41,19 +41,19 @@ struct StoredPosterior {
     kind: Kind,
     /// The table of `stage.toml` that describes its converter; empty if it has none.
     converter: &'static str,
-    /// What it is, for a draft of `stage.toml`.
+    /// Its description in a draft of `stage.toml`.
     meaning: &'static str,
-    /// Words by which a draft guesses it, without unit, spaces and underscores, in lower case.
+    /// Words from which a draft guesses it, without unit, spaces and underscores, in lower case.
     words: &'static [&'static str],
 }
 
-/// Makes [`Quantity`] and what is known of each, one row for each.
+/// Makes [`Quantity`] and its table, one row for each quantity.
 macro_rules! quantities {
     ($($name:ident, $key:literal, $column:literal, $kind:ident, $converter:literal, $meaning:literal, [$($word:literal)*];)*) => {
         /// A quantity that a column can hold.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(usize)]
-        #[expect(missing_docs, reason = "the module's table says what each holds")]
+        #[expect(missing_docs, reason = "the table of the module describes each")]
         pub enum Quantity { $($name,)* }
 
         impl Quantity {
@@ -61,7 +61,7 @@ macro_rules! quantities {
             pub const ALL: [Self; [$($key),*].len()] = [$(Self::$name),*];
         }
 
-        static KNOWN: [StoredPosterior; Quantity::ALL.len()] = [$(StoredPosterior {
+        static TABLE: [Entry; Quantity::ALL.len()] = [$(Entry {
             key: $key,
             default_column: $column,
             kind: Kind::$kind,
@@ -110,46 +110,45 @@ impl Quantity {
     /// The reference pose in SI units.
     pub const PLANAR: [Self; 3] = [Self::X, Self::Y, Self::Rz];
 
-    fn known(self) -> &'static StoredPosterior {
-        &KNOWN[self as usize]
+    fn entry(self) -> &'static Entry {
+        &TABLE[self as usize]
     }
 
     /// Its key in the table `[log]` of `stage.toml`.
     pub fn key(self) -> &'static str {
-        self.known().key
+        self.entry().key
     }
 
     /// Its column in a log, unless `[log]` names another.
     pub fn default_column(self) -> &'static str {
-        self.known().default_column
+        self.entry().default_column
     }
 
     /// The table of `stage.toml` that describes its converter; empty if it has none.
     pub(crate) fn table(self) -> &'static str {
-        self.known().converter
+        self.entry().converter
     }
 
-    /// What it is, for a draft of `stage.toml`.
+    /// Its description in a draft of `stage.toml`.
     pub(crate) fn meaning(self) -> &'static str {
-        self.known().meaning
+        self.entry().meaning
     }
 
-    /// What its numbers are.
+    /// The kind of its numbers.
     pub fn kind(self) -> Kind {
-        self.known().kind
+        self.entry().kind
     }
 
-    /// What a column of this name, with this unit if it has one, seems to hold, for a draft that the
-    /// user corrects.
+    /// The probable quantity of a column with this name and unit, for a draft that the user corrects.
     pub(crate) fn guess(name: &str, unit: Option<&str>) -> Option<Self> {
         let base = units::split(name).0;
-        let word = units::key_of(base).replace('_', "");
-        let is_one = |quantity: &Self| quantity.known().words.contains(&word.as_str());
+        let word = units::to_key(base).replace('_', "");
+        let is_one = |quantity: &Self| quantity.entry().words.contains(&word.as_str());
         let found = Self::ALL.into_iter().find(is_one)?;
         Some(found.in_unit(unit))
     }
 
-    /// The same; but a capacitive column in a unit of length holds a gap and no code.
+    /// The same quantity; but a capacitive column in a unit of length holds a gap, and no codes.
     pub(super) fn in_unit(self, unit: Option<&str>) -> Self {
         let is_length = unit.is_some_and(|unit| Kind::Length.unit(unit).is_some());
         let gap = Self::GAPS.iter().position(|gap| *gap == self);
@@ -169,7 +168,7 @@ pub struct Column {
     pub scale: f64,
 }
 
-/// The columns of all quantities, and those to leave out.
+/// The columns of all quantities, and the columns to leave out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogLayout {
     columns: [Column; Quantity::ALL.len()],
@@ -183,25 +182,25 @@ pub struct LogLayout {
     pub capacitive_volts_per_count: Option<f64>,
 }
 
-/// What a column's name says.
+/// The meaning of a column's name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Meaning<'n> {
-    /// It is the name of this quantity's column, letter for letter.
+    /// The exact name of the column of this quantity.
     Exact(Quantity),
-    /// It is that of a quantity which `[log]` does not name, with this unit, if it has one.
+    /// Another name of this quantity, which `[log]` does not map, with its unit, if it has one.
     WithUnit(Quantity, Option<&'n str>),
-    /// It is in `ignore`.
+    /// The column is in `ignore`.
     Ignored,
-    /// Nothing that is known.
+    /// The name is not known.
     Unknown,
 }
 
-/// Why a unit leads nowhere.
+/// Why a unit cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UnitFault {
-    /// There is no such unit of this kind.
+    /// No unit of this kind.
     Unknown,
-    /// A voltage, and how many volts a code has is not known.
+    /// A voltage, and the volts per code are not known.
     NoVoltsPerCount,
 }
 
@@ -211,7 +210,7 @@ impl Default for LogLayout {
             let name = quantity.default_column();
             Column {
                 name: name.to_owned(),
-                scale: quantity.kind().unit_of_name(name).unwrap_or(1.0),
+                scale: quantity.kind().unit_in_name(name).unwrap_or(1.0),
             }
         };
         Self {
@@ -241,7 +240,7 @@ impl LogLayout {
         self.mapped[quantity as usize]
     }
 
-    /// What a column of this name holds.
+    /// The meaning of a name.
     pub(crate) fn meaning<'n>(&self, name: &'n str) -> Meaning<'n> {
         if self.ignored.iter().any(|ignored| ignored == name) {
             return Meaning::Ignored;
@@ -251,7 +250,7 @@ impl LogLayout {
             return Meaning::Exact(exact);
         }
         let (base, unit) = units::split(name);
-        let key = units::key_of(base);
+        let key = units::to_key(base);
         let named = |quantity: &Quantity| {
             let default = units::split(quantity.default_column()).0;
             !self.is_mapped(*quantity) && (key == quantity.key() || key == default)

@@ -9,13 +9,13 @@ use sha2::Sha256;
 /// Bytes that are read at once.
 const PIECE_BYTES: usize = 128 * 1024;
 
-/// Longest line. What is longer is damaged or hostile.
+/// Longest line, bytes. A longer line is damaged or hostile.
 pub(crate) const LINE_BYTES_MAX: usize = 1 << 20;
 
-/// How much of a text is read to find out the form of its table.
+/// Number of bytes that decide the form of a table.
 pub(crate) const OPENING_BYTES: usize = 1 << 20;
 
-/// The lines of a text, one after the other; they end in LF, CRLF or CR.
+/// The lines of a text; they end in LF, CRLF or CR.
 pub struct Lines<'a> {
     text: TextReader<'a>,
     buffer: Vec<u8>,
@@ -64,10 +64,10 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// The lines that follow, about a mebibyte of them; they stay the next ones.
+    /// The next lines, about a mebibyte, without taking them.
     ///
     /// # Errors
-    /// Those of reading, `LineTooLong`.
+    /// Errors of reading, `LineTooLong`.
     pub(super) fn opening(&mut self) -> Result<&[u8], LogError> {
         while !self.is_whole && self.buffer.len() - self.at < OPENING_BYTES {
             self.fill(OPENING_BYTES)?;
@@ -84,7 +84,7 @@ impl<'a> Lines<'a> {
     /// The next line, without its break; `None` at the end.
     ///
     /// # Errors
-    /// Those of reading, `LineTooLong`.
+    /// Errors of reading, `LineTooLong`.
     pub fn next_line(&mut self) -> Result<Option<&[u8]>, LogError> {
         let line = loop {
             let rest = self.buffer.get(self.at..).unwrap_or_default();
@@ -105,7 +105,7 @@ impl<'a> Lines<'a> {
         Ok(self.buffer.get(line))
     }
 
-    /// Whether the text ends with the line that was taken, without a line break.
+    /// Whether the last line was taken and has no line break.
     pub(super) fn is_open(&self) -> bool {
         let is_break = |byte: &u8| matches!(byte, b'\n' | b'\r');
         self.is_whole && self.at == self.buffer.len() && !self.buffer.last().is_some_and(is_break)
@@ -115,7 +115,7 @@ impl<'a> Lines<'a> {
         self.text.into_hash()
     }
 
-    /// Reads on, and lets go of the lines that were taken.
+    /// Reads on, and drops the lines that were taken.
     fn fill(&mut self, bytes: usize) -> Result<(), LogError> {
         self.buffer.drain(..self.at);
         self.at = 0;
@@ -123,14 +123,14 @@ impl<'a> Lines<'a> {
         self.progress.reach(self.text.progress().0);
         match self.watch.is_stopped() {
             true => {
-                Err(Place::of(self.text.path(), None).refuse(SourceProblem::Interrupted.into()))
+                Err(Place::new(self.text.path(), None).refuse(SourceProblem::Interrupted.into()))
             }
             false => Ok(()),
         }
     }
 
     fn too_long(&self) -> LogError {
-        Place::of(self.text.path(), self.line + 1).refuse(LogProblem::LineTooLong {
+        Place::new(self.text.path(), self.line + 1).refuse(LogProblem::LineTooLong {
             limit_bytes: LINE_BYTES_MAX,
         })
     }

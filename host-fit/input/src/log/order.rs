@@ -9,18 +9,17 @@ use super::error::{LogError, LogProblem, Place};
 use super::table::Head;
 use std::collections::HashMap;
 
-/// Most movements of a log: more than a week of the shortest, in little memory.
+/// Most movements of a log: more than a week of the shortest movements, in little memory.
 pub(super) const MOVEMENTS_MAX: usize = 1 << 19;
 
-/// Longest gap within a movement, in periods of the log: longer than what a busy computer loses
-/// now and then, shorter than it takes to reset an interferometer.
+/// Longest gap within a movement, in periods of the log: a busy computer loses fewer rows, and the reset of an
+/// interferometer takes longer.
 pub(super) const GAP_PERIODS: f64 = 10.0;
 
-/// So many rows make a movement after which the time may start again; after fewer, rows are out
-/// of order.
+/// Fewest rows before the time may start again; after fewer rows the log is out of order.
 const ROWS_MIN: usize = 10;
 
-/// Which cells of a row hold its place.
+/// The cells with the time and the movement.
 #[derive(Clone, Copy, Debug)]
 pub struct OrderCells {
     /// The time.
@@ -29,7 +28,7 @@ pub struct OrderCells {
     pub movement: Option<usize>,
 }
 
-/// Where a kept row stands in its movement.
+/// The place of a kept row in its movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeptRow {
     /// Number of its movement.
@@ -47,20 +46,20 @@ pub struct Order {
     cells: OrderCells,
     /// The median time between rows, us.
     pub period_us: f64,
-    /// Length of the movements, us, where the user asks for one.
+    /// Length of the movements, us, if the user asks for one.
     split_us: Option<f64>,
     /// Movement, if there is a column for it, and time of the row in hand.
     current: Option<(Option<i64>, f64)>,
-    /// The line at which each movement was left.
+    /// The line after the end of each movement.
     left: HashMap<i64, usize>,
-    /// Time of the first row, kept or not, since the time last started, and how many rows since then.
+    /// Time of the first row, kept or not, since the time last started, and the number of rows since then.
     started: (f64, usize),
     /// Whether a movement begins with the next row that is kept.
     begins: bool,
     kept: Kept,
     /// Movements so far.
     pub(super) movements: usize,
-    /// The first movement with a single row, and how many there are.
+    /// The first movement with a single row, and the number of such movements.
     single: Option<(i64, usize)>,
 }
 
@@ -71,13 +70,12 @@ struct Kept {
     rows: usize,
     first_us: f64,
     last_us: f64,
-    /// Of the last one.
+    /// Of the last row.
     sequence: u32,
 }
 
 impl Order {
-    /// Of a log with this period, us; `split_s` is the length of its movements, if the user asks for
-    /// one.
+    /// For a log with this period, us; `split_s` is the length of its movements, if the user asks for one.
     pub fn new(cells: OrderCells, period_us: f64, split_s: Option<f64>) -> Self {
         Self {
             cells,
@@ -133,7 +131,7 @@ impl Order {
                 if self.left.len() >= MOVEMENTS_MAX {
                     let limit = MOVEMENTS_MAX;
                     let problem = LogProblem::TooManyMovements { limit };
-                    return Err(Place::of(&head.path, line).refuse(problem));
+                    return Err(Place::new(&head.path, line).refuse(problem));
                 }
                 self.started = (t_us, 1);
                 self.begins = true;
@@ -173,7 +171,7 @@ impl Order {
         }
     }
 
-    /// The last movement is over. Gives the first movement with a single row, and how many there are.
+    /// Ends the last movement. Returns the first movement with a single row, and the number of such movements.
     pub(super) fn end_movement(&mut self) -> Option<(i64, usize)> {
         if self.kept.rows == 1 {
             self.single.get_or_insert((self.kept.movement, 0)).1 += 1;

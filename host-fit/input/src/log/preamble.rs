@@ -11,10 +11,10 @@ pub(super) const COMMENT: u8 = b'#';
 /// What may separate cells.
 const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 
-/// How many lines of notes may stand above the header, comments and blank lines not counted.
+/// Most lines of notes above the header, without comments and blank lines.
 const LINES_MAX: usize = 200;
 
-/// So many names of columns that are known make a line the header.
+/// Fewest known names of columns in a header.
 const KNOWN_MIN: usize = 3;
 
 /// The header of a table.
@@ -45,7 +45,7 @@ pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Opti
     });
     for TextLine { text, line, end } in lines_of(bytes) {
         let note = text.strip_prefix(&[COMMENT]);
-        let found = HeaderLine::of(note.unwrap_or(text), line, end, &mut records);
+        let found = HeaderLine::new(note.unwrap_or(text), line, end, &mut records);
         if note.is_some() {
             let is_header = known(&found) >= KNOWN_MIN && !plain.iter().any(is_row);
             comment = if is_header { Some(found) } else { comment };
@@ -83,8 +83,8 @@ pub(super) fn is_numeric(names: &[String]) -> bool {
 }
 
 impl HeaderLine {
-    fn of(text: &[u8], line: usize, end: usize, records: &mut [Record; 3]) -> Self {
-        // Of the separators the one that the line has most.
+    fn new(text: &[u8], line: usize, end: usize, records: &mut [Record; 3]) -> Self {
+        // The most frequent separator of the line.
         let count = |which: &usize| text.iter().filter(|b| **b == SEPARATORS[*which]).count();
         let which = (1..3).fold(0, |best, other| match count(&other) > count(&best) {
             true => other,
@@ -92,7 +92,7 @@ impl HeaderLine {
         });
         let record = &mut records[which];
         record.split(text);
-        // One too many is enough to refuse it.
+        // One column too many is enough to refuse it.
         let cells = record.cells().take(COLUMNS_MAX + 1);
         Self {
             line,
@@ -103,8 +103,8 @@ impl HeaderLine {
     }
 }
 
-/// A cell's text without white space around it. What is not UTF-8 is Latin-1, in which older
-/// programs write the micro sign.
+/// A cell's text without white space around it. Other text than UTF-8 is Latin-1: older programs write the micro
+/// sign in it.
 pub(super) fn text(cell: &[u8]) -> String {
     let cell = cell.trim_ascii();
     match core::str::from_utf8(cell) {
@@ -139,7 +139,7 @@ mod tests {
         ] {
             assert_eq!(header(text), (line, names.clone()), "{text:?}");
         }
-        // Nothing is known: the line above the rows, or the first that is no comment.
+        // Without known names: the line above the rows, or the first line that is no comment.
         assert_eq!(header("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3").0, 3);
         assert_eq!(
             header("note\n\n# note\nx,y,z\n2026-01-02T03:04:05,2,3").0,

@@ -18,7 +18,7 @@ pub(super) struct Dialect {
 /// The cells of the line in hand.
 pub(super) struct Record {
     decimal_commas: bool,
-    /// Takes lines apart, and lines in which quotation marks are text.
+    /// The second one takes quotation marks as text.
     readers: [Reader; 2],
     text: Vec<u8>,
     /// Where the first cell starts and where each ends in the text.

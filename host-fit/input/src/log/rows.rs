@@ -16,11 +16,11 @@ use runtime::{RawFrame, VerticalPose};
 pub const ROTATION_MAX_RAD: f64 = 0.1;
 /// Largest sensible temperature, m degC. Kelvin taken for degrees Celsius are beyond it.
 const TEMPERATURE_MAX_MC: f64 = 2e5;
-/// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
-/// that is worth reading has a quarter of its designed sensitivity.
+/// Largest sensible displacement, in full scales of its sensor: no useful sensor has a quarter of its designed
+/// sensitivity.
 const FULL_SCALES: f64 = 4.0;
 
-/// A bad cell: which one, from 0, and what is wrong.
+/// A bad cell: its number, from 0, and its fault.
 pub(super) struct BadCell {
     pub(super) cell: usize,
     pub(super) fault: CellFault,
@@ -39,7 +39,7 @@ pub(super) struct RowReader<'a> {
     zero_mc: f64,
     keep_saturated: bool,
     clock: Clock,
-    /// Voltages, and the sum of how far they are from whole codes.
+    /// Number of voltages, and the sum of their differences from whole codes.
     between_codes: (usize, f64),
 }
 
@@ -71,7 +71,7 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// How far voltages are from whole codes on average; 0 if the log has none.
+    /// Mean difference of voltages from whole codes; 0 without voltages.
     pub(super) fn between_codes(&self) -> f64 {
         let (cells, sum) = self.between_codes;
         sum / cells.max(1) as f64

@@ -47,9 +47,9 @@ impl Skipped {
         match self.reasons.into_iter().next() {
             Some((fault, place, _)) => {
                 let first = Box::new(place.refuse(fault.into()));
-                Place::of(path, None).refuse(LogProblem::NoGoodRows { rows, first })
+                Place::new(path, None).refuse(LogProblem::NoGoodRows { rows, first })
             }
-            None => Place::of(path, header_line).refuse(LogProblem::HeaderOnly),
+            None => Place::new(path, header_line).refuse(LogProblem::HeaderOnly),
         }
     }
 

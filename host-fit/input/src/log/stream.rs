@@ -14,8 +14,8 @@ use crate::text::TextReader;
 use sha2::Sha256;
 use std::path::{Path, PathBuf};
 
-/// Mean distance of voltages from whole codes that passes in silence: those that were computed from
-/// codes and written with few digits stay below it, those of another instrument have 0.25.
+/// Largest mean difference of voltages from whole codes without a warning. Voltages that were computed from codes
+/// and written with few digits stay below it; another instrument gives 0.25.
 const BETWEEN_CODES: f64 = 0.15;
 
 /// A row of a log.
@@ -29,8 +29,7 @@ pub struct LogRow {
     pub row: Row,
 }
 
-/// The rows of a log from its start to its end. Memory does not grow with the log, other than by some
-/// bytes for each movement.
+/// The rows of a log from start to end. Memory grows only by some bytes for each movement.
 pub struct LogRows<'a> {
     table: Table<'a>,
     reader: RowReader<'a>,
@@ -39,16 +38,16 @@ pub struct LogRows<'a> {
     options: ReadOptions,
 }
 
-/// What is known of a log at its end.
+/// A log at its end.
 #[derive(Debug)]
 pub struct LogEnd {
-    /// The file, as messages name it.
+    /// The name of the file in messages.
     pub path: PathBuf,
-    /// How many rows were left out; the warnings say why.
+    /// Number of rows that were left out; the warnings give the reasons.
     pub skipped_rows: usize,
     /// Whether it holds the interferometers' reference.
     pub has_reference: bool,
-    /// What is odd about it.
+    /// Its warnings.
     pub warnings: Vec<Finding>,
     pub(super) hash: Option<Sha256>,
 }
@@ -57,7 +56,7 @@ impl<'a> LogRows<'a> {
     /// Opens a log; `what` is being done with it, for the progress.
     ///
     /// # Errors
-    /// Those of [`LogError`] up to the first row.
+    /// Errors up to the first row: see [`LogError`].
     pub fn open(
         path: &Path,
         what: &'static str,
@@ -78,7 +77,7 @@ impl<'a> LogRows<'a> {
         table.lines = table.lines.watched(options.watch, what);
         let columns = header::columns(&table.head, stage, options.reference)?;
         if columns.movement.is_some() && options.split_s.is_some() {
-            return Err(Place::of(table.head.path, None).refuse(LogProblem::SplitWithMovements));
+            return Err(Place::new(table.head.path, None).refuse(LogProblem::SplitWithMovements));
         }
         let servo_us = stage.servo_period_s * 1e6;
         let period_us = table.period_us(columns.time, columns.movement)?;
@@ -104,7 +103,7 @@ impl<'a> LogRows<'a> {
     /// The next row; `None` at the end.
     ///
     /// # Errors
-    /// Those of [`LogError`] but `NoLog` and `SameLog`: the first fault of the log.
+    /// The first fault of the log: see [`LogError`].
     pub fn next_row(&mut self) -> Result<Option<LogRow>, LogError> {
         while self.table.next_row()? {
             let (cells, line) = (&self.table.row, self.table.lines.line);
@@ -150,7 +149,7 @@ impl<'a> LogRows<'a> {
         }
     }
 
-    /// What is odd about a log that was read to its end.
+    /// The warnings of a log that was read to its end.
     ///
     /// # Errors
     /// `HeaderOnly`, `NoGoodRows`.

@@ -1,8 +1,7 @@
 //! A log as a table: named columns, then rows of cells, each with its place in the file.
 //!
-//! This is the seam for other formats. Whatever reads logs and references sees a table only
-//! through [`Head`] and [`Table`]; CSV is the one format behind them today. Columns may be fewer
-//! than a log of `fit` has: which of them are needed is decided in [`super::header`].
+//! Readers of logs and references see a table only through [`Head`] and [`Table`], so another format than CSV is
+//! possible. [`super::header`] decides which columns are needed.
 
 use super::cell::{Cell, shown};
 use super::decimal;
@@ -20,10 +19,10 @@ use std::path::PathBuf;
 /// Longest unit in a row of units, in characters, with brackets.
 const UNIT_CHARACTERS: usize = 10;
 
-/// Most columns of a table. What has more is damaged or hostile.
+/// Most columns of a table. A table with more is damaged or hostile.
 pub(super) const COLUMNS_MAX: usize = 4096;
 
-/// What stands above the rows of a table.
+/// The head of a table, above its rows.
 #[derive(Debug)]
 pub struct Head {
     /// The file.
@@ -102,7 +101,7 @@ fn is_row(line: &[u8], separator: u8) -> bool {
 
 /// A table, one row in hand at a time.
 pub struct Table<'a> {
-    /// What stands above the rows.
+    /// The head, above the rows.
     pub head: Head,
     pub(super) lines: Lines<'a>,
     /// The row in hand.
@@ -122,16 +121,16 @@ impl<'a> Table<'a> {
     /// separate cells. All this is decided by the first mebibyte of the text.
     ///
     /// # Errors
-    /// Those of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `LineTooLong`.
+    /// Errors of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `LineTooLong`.
     pub fn open(text: TextReader<'a>, is_known: impl Fn(&str) -> bool) -> Result<Self, LogError> {
         let path = text.path().to_path_buf();
         let mut lines = Lines::new(text);
         let opening = lines.opening()?;
         let Some(header) = preamble::find_header(opening, is_known) else {
-            return Err(Place::of(path, None).refuse(LogProblem::Empty));
+            return Err(Place::new(path, None).refuse(LogProblem::Empty));
         };
         let (line, separator) = (header.line, header.separator);
-        let refused = |problem| Place::of(&path, line).refuse(problem);
+        let refused = |problem| Place::new(&path, line).refuse(problem);
         check_names(&header.names).map_err(refused)?;
         let rows = opening.get(header.end..).unwrap_or_default();
         let mut row = Record::new(Dialect {
@@ -170,7 +169,7 @@ impl<'a> Table<'a> {
     /// text; `None` if that does not show it.
     ///
     /// # Errors
-    /// Those of reading, `LineTooLong`.
+    /// Errors of reading, `LineTooLong`.
     pub fn period_us(
         &mut self,
         time: Source,
@@ -196,7 +195,7 @@ impl<'a> Table<'a> {
     /// Takes the next row in hand; `false` at the end.
     ///
     /// # Errors
-    /// Those of reading, `LineTooLong`, `CellCount`, `CutLine`.
+    /// Errors of reading, `LineTooLong`, `CellCount`, `CutLine`.
     pub fn next_row(&mut self) -> Result<bool, LogError> {
         let expected = self.head.names.len();
         loop {
@@ -209,7 +208,7 @@ impl<'a> Table<'a> {
             }
         }
         let (found, line) = (self.row.len(), self.lines.line);
-        let refuse = |problem| Err(Place::of(&self.head.path, line).refuse(problem));
+        let refuse = |problem| Err(Place::new(&self.head.path, line).refuse(problem));
         if self.lines.is_open() {
             self.open_line = Some(line);
             let last_is_empty = self.row.cell(found.saturating_sub(1)).text.is_empty();

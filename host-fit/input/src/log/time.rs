@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     fn t_us(cell: &str) -> Result<f64, CellFault> {
-        Clock::default().t_us(Cell::of(cell), 1e3)
+        Clock::default().t_us(Cell::new(cell), 1e3)
     }
 
     #[test]
@@ -108,8 +108,8 @@ mod tests {
         for first in forms {
             for second in forms {
                 let mut clock = Clock::default();
-                clock.t_us(Cell::of(first), 1.0).expect("the first");
-                let have = clock.t_us(Cell::of(second), 1.0);
+                clock.t_us(Cell::new(first), 1.0).expect("the first");
+                let have = clock.t_us(Cell::new(second), 1.0);
                 assert_eq!(have.is_ok(), first == second, "{first} {second}");
             }
         }

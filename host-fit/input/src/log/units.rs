@@ -27,7 +27,7 @@ const TIMES_TO_US: [(&str, f64); 5] = [
     ("iso", 1.0),
 ];
 const VOLTAGES: [(&str, f64); 3] = [("V", 1.0), ("mV", 1e-3), ("uV", 1e-6)];
-/// What stands for no unit: of codes and indices.
+/// Marks of codes and indices, which have no unit.
 const COUNTS: [&str; 7] = ["", "-", "cnt", "count", "counts", "code", "LSB"];
 
 /// A symbol as the tables here write it.
@@ -64,7 +64,7 @@ impl Kind {
         }
     }
 
-    /// What one `symbol` is in m, rad, us or, of codes, V; `None` if this kind has no such unit.
+    /// One `symbol` in m, rad, us or, for codes, V; `None` if this kind has no such unit.
     pub fn unit(self, symbol: &str) -> Option<f64> {
         let symbol = plain(symbol);
         let found = self.table().iter().find(|(name, _)| *name == symbol)?;
@@ -72,12 +72,12 @@ impl Kind {
     }
 
     /// Whether one unit of this kind is `scale` m, rad or us.
-    pub(super) fn has_unit_of(self, scale: f64) -> bool {
+    pub(super) fn has_unit(self, scale: f64) -> bool {
         self.table().iter().any(|(_, unit)| *unit == scale)
     }
 
     /// The unit that a column's name ends in, as `_nm` in `ifm_x_nm` or `[um]` in `X [um]`.
-    pub fn unit_of_name(self, name: &str) -> Option<f64> {
+    pub fn unit_in_name(self, name: &str) -> Option<f64> {
         self.unit(split(name).1.unwrap_or(name))
     }
 
@@ -90,15 +90,15 @@ impl Kind {
         }
     }
 
-    /// The unit of SI, and what a scale in it is worth; `None` of numbers without a unit, or of voltages.
+    /// The SI unit, and its scale; `None` for numbers without a unit, and for voltages.
     pub fn si(self) -> Option<(&'static str, f64)> {
         let first = || self.table().first().copied();
         first().filter(|_| !matches!(self, Self::Index | Self::Code))
     }
 }
 
-/// A column's name without its unit, and the unit: what stands in brackets at its end, or a known
-/// unit after the last slash or underscore.
+/// A column's name without its unit, and the unit: the text in brackets at its end, or a known unit after the last
+/// slash or underscore.
 pub fn split(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -116,8 +116,8 @@ pub fn split(name: &str) -> (&str, Option<&str>) {
     (name, None)
 }
 
-/// A name without its unit as keys are written: lower case, one underscore between words.
-pub fn key_of(base: &str) -> String {
+/// A name without its unit, written like a key: lower case, one underscore between words.
+pub fn to_key(base: &str) -> String {
     let words = base.split(|c: char| c.is_whitespace() || "_-.".contains(c));
     let words: Vec<String> = words
         .filter(|word| !word.is_empty())
@@ -151,8 +151,8 @@ mod tests {
         ] {
             assert_eq!(split(name), (base, unit), "{name}");
         }
-        assert_eq!(key_of("Hall  A"), "hall_a");
-        assert_eq!(key_of("IFM-Y1"), "ifm_y1");
+        assert_eq!(to_key("Hall  A"), "hall_a");
+        assert_eq!(to_key("IFM-Y1"), "ifm_y1");
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         }
         assert_eq!(Kind::Angle.unit("\u{b5}rad"), Some(1e-6));
         assert_eq!(Kind::Angle.unit("\u{b0}"), Kind::Angle.unit("deg"));
-        assert_eq!(Kind::Time.unit_of_name("t (\u{3bc}s)"), Some(1.0));
+        assert_eq!(Kind::Time.unit_in_name("t (\u{3bc}s)"), Some(1.0));
         assert_eq!(Kind::Length.unit("s"), None);
     }
 }

@@ -4,7 +4,7 @@ use crate::log::{LogError, LogProblem, LogReading, ReadOptions, read, read_bytes
 use crate::shipped::{LOG_GZ, stage};
 use std::path::{Path, PathBuf};
 
-/// Movements of 20 rows, whose rows `row` gives by movement and row.
+/// Movements of 20 rows: `row` gives by movement and row.
 fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
     let options = ReadOptions::default();
     let made = read_bytes(LOG_GZ, Path::new("log"), &stage(), &options)
@@ -45,7 +45,7 @@ fn shipped(folder: &tempfile::TempDir, name: &str) -> PathBuf {
 
 fn options(rows_max: usize) -> ReadOptions {
     ReadOptions {
-        rows_max: Some(rows_max),
+        rows_max,
         ..ReadOptions::FIT
     }
 }
@@ -71,7 +71,7 @@ fn kept(dataset: &Dataset, rows_max: usize) -> Dataset {
 }
 
 #[test]
-fn of_a_long_log_runs_are_kept_as_they_are() {
+fn a_long_log_is_sampled_in_unchanged_runs() {
     let folder = tempfile::tempdir().expect("a folder");
     let paths = [shipped(&folder, "log.csv.gz")];
     let all = read_at_most(&paths, 57_000).expect("sound");

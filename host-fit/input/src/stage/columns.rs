@@ -1,4 +1,4 @@
-//! Reads the optional table `[log]`: which column of a log holds what, and in which unit.
+//! Reads the optional table `[log]`: the column and the unit of each quantity.
 //!
 //! Each key is a quantity of [`Quantity`]; its value is the column's name, or a table:
 //!
@@ -136,7 +136,7 @@ fn column(
             scale.into_inner() * per_si
         }
         (Some(unit), None) => of_unit(unit.get_ref(), unit.span())?,
-        (None, None) if kind.unit_of_name(&name).is_some() => {
+        (None, None) if kind.unit_in_name(&name).is_some() => {
             of_unit(units::split(&name).1.unwrap_or(&name), column.span())?
         }
         (None, None) if si.is_some() => {

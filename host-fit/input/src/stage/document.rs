@@ -1,5 +1,4 @@
-//! The parsed text of a stage file: gives the values of its tables, and of whatever is wrong the
-//! place and the key.
+//! The parsed text of a stage file: the values of its tables, and the place and the key of every fault.
 
 use super::error::{StageError, TextPosition};
 use crate::draft::MARK;
@@ -20,7 +19,7 @@ pub(super) struct Document<'t> {
     asked: RefCell<Vec<(String, String)>>,
 }
 
-/// A list as it stands in the file.
+/// A list of the file.
 pub(super) type List<T> = Spanned<Vec<T>>;
 
 impl<'t> Document<'t> {
@@ -211,7 +210,7 @@ impl<'t> Document<'t> {
 
     fn wrong_kind(&self, span: Range<usize>, message: &str) -> StageError {
         let key = self.key(&span);
-        // What was found quotes the file; what was expected is in serde's words.
+        // serde quotes the file, and names the expected type in words of Rust.
         let (found, expected) = message.split_once(", expected ").unwrap_or((message, ""));
         let expected = expected
             .replace("f64", "a number")
@@ -289,7 +288,7 @@ fn names(key: &str) -> impl Iterator<Item = &str> {
     key.split('.').filter(|name| !name.is_empty())
 }
 
-/// The key of what is called `name` in a table; that of the file is empty.
+/// The key of `name` in a table; the key of the file itself is empty.
 fn joined(table: &str, name: &str) -> String {
     match table {
         "" => name.to_owned(),

@@ -34,7 +34,7 @@ const TRIANGLE_MIN: f64 = 1e-3;
 /// along X.
 const SPACING_MIN_M: f64 = 1e-4;
 
-/// Directions from which theta counts, counterclockwise from X: A and B sense Y, C senses X.
+/// Directions for theta = 0, counterclockwise from X: A and B sense Y, C senses X.
 const STANDARD_DEG: [f64; 3] = [90.0, 90.0, 0.0];
 
 impl Stage {
@@ -54,7 +54,7 @@ impl Stage {
     /// Checks the text of a `stage.toml`; `path` is only named in errors.
     ///
     /// # Errors
-    /// As [`Stage::from_file`], without those of reading.
+    /// As [`Stage::from_file`], without errors of reading.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, StageError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let document = &Document::parse(text, path)?;

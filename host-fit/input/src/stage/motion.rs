@@ -16,11 +16,11 @@ use crate::axis::{AXES, Axis};
 pub struct AxisMotion {
     /// Largest magnitude in service.
     pub service: f64,
-    /// Largest magnitude in a calibration run; by default that of service.
+    /// Largest magnitude in a calibration run; by default equal to `service`.
     pub amplitude: f64,
-    /// Largest speed; by default that of a sine over the range of service at 1 Hz.
+    /// Largest speed; by default the speed of a sine over the range of service at 1 Hz.
     pub speed: f64,
-    /// Largest acceleration; by default that of a sine over half the range of service at 2 Hz.
+    /// Largest acceleration; by default the acceleration of a sine over half the range of service at 2 Hz.
     pub acceleration: f64,
 }
 
@@ -37,7 +37,7 @@ const SERVICE: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
 /// Default speed over range of service, 1/s: 2 pi 1 Hz. The fastest motion of the given logs,
 /// sines over half the range at up to 2 Hz, has the same.
 const SPEED: f64 = std::f64::consts::TAU;
-/// Default acceleration over range of service, 1/s2: that of those sines.
+/// Default acceleration over range of service, 1/s2, of those sines.
 const ACCELERATION: f64 = 2.0 * SPEED * SPEED;
 /// Ranges that make sense, m or rad: beyond the larger one no small angle is small.
 const RANGES: (f64, f64) = (1e-7, 1e-2);

@@ -1,4 +1,4 @@
-//! The table `[search]`: the ranges in which a search looks, and in which a fit's parameters are expected.
+//! The table `[search]`: the search ranges, which also bound the expected parameters of a fit.
 //! Every key is optional: the defaults follow from the design.
 
 use super::document::{Document, List};
@@ -29,7 +29,7 @@ const FALL_PER_M: Range = Range::new(-5000.0, 0.0);
 /// Usual zero deviation at most, m.
 const DELTA_M: f64 = 1e-4;
 
-/// [low, high] as it stands in the file.
+/// [low, high] of the file.
 type Ends = List<Spanned<f64>>;
 
 /// The ranges of the table, which must hold the designed coordinates. A key that it leaves out has
@@ -81,7 +81,7 @@ pub(super) fn ranges(
     Ok(ranges)
 }
 
-/// The range of so much to both sides of a value.
+/// The range of `room` to both sides of a value.
 const fn about(value: f64, room: f64) -> Range {
     Range::new(value - room, value + room)
 }

@@ -72,7 +72,7 @@ fn a_sound_file_gives_the_stage_in_si_units() {
     assert_eq!(stage.y_baseline_m, 0.1);
     let theta = 8f64.to_radians();
     let range = |low, high| Range { low, high };
-    let term = |key| stage.search.of(key).expect(key);
+    let term = |key| stage.search.get(key).expect(key);
     assert_eq!(term("theta_deg"), [range(-theta, theta); 3]);
     assert_eq!(
         term("eta"),
@@ -82,10 +82,10 @@ fn a_sound_file_gives_the_stage_in_si_units() {
     assert_eq!(term("a_per_m"), [falling; 3]);
     assert_eq!(term("b_per_rad"), [falling; 3]);
     assert_eq!(term("c_per_rad"), [rising, falling, rising]);
-    assert_eq!(stage.search.of("d_per_m"), None);
+    assert_eq!(stage.search.get("d_per_m"), None);
     let mut search = stage.search.clone();
     search.set("d_per_m", [rising; 3]);
-    assert_eq!(search.of("d_per_m"), Some([rising; 3]));
+    assert_eq!(search.get("d_per_m"), Some([rising; 3]));
     assert_eq!(stage.search.delta_m.high, 10e-6);
     assert_eq!(stage.log, crate::log::layout::LogLayout::default());
     let crlf = format!("\u{feff}{}", SOUND.replace('\n', "\r\n"));
@@ -131,7 +131,7 @@ fn ranges_that_are_left_out_follow_from_the_design() {
     };
     close(search.places_m[2][1], 0.26, 0.46);
     close(search.delta_m, -1e-4, 1e-4);
-    let term = |key| search.of(key).expect(key);
+    let term = |key| search.get(key).expect(key);
     for range in term("eta") {
         close(range, 0.5, 1.5);
     }
@@ -147,7 +147,7 @@ fn ranges_that_are_left_out_follow_from_the_design() {
         "{}[search]\neta_b = [0.6, 0.7]\n",
         &SOUND[..start]
     ));
-    let eta = eta.expect("sound").search.of("eta").expect("a range");
+    let eta = eta.expect("sound").search.get("eta").expect("a range");
     close(eta[0], 0.5, 1.5);
     close(eta[1], 0.6, 0.7);
 }
@@ -167,7 +167,7 @@ type Case = (
 fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
     #[rustfmt::skip]
     let cases: &[Case] = &[
-        // Unknown keys, with the one that is meant or those that are known.
+        // Unknown keys, with the intended key or the known keys.
         ("period_s", "perod_s", 23, 1, "servo.perod_s", "did you mean `period_s`?"),
         ("[servo]", "[servos]", 22, 2, "servos", "did you mean `servo`?"),
         ("[search]", "[serach]", 25, 2, "serach", "did you mean `search`?"),
@@ -236,7 +236,7 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         assert!(message.contains(part), "{part}: {message}");
     }
     // The designed eta of 1 lies outside its range on purpose.
-    let eta = parse(SOUND).expect("sound").search.of("eta");
+    let eta = parse(SOUND).expect("sound").search.get("eta");
     assert!(eta.is_some_and(|eta| !eta[0].contains(1.0)));
 }
 

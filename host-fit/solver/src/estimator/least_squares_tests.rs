@@ -110,7 +110,7 @@ fn no_parameter_of_the_optimum_lowers_the_cost() {
 #[test]
 fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends_on_the_edge() {
     let mut narrow = stage();
-    let mut eta = narrow.search.of("eta").expect("known");
+    let mut eta = narrow.search.get("eta").expect("known");
     eta[0].high = 0.85;
     narrow.search.set("eta", eta);
     let dataset = noisy(7).dataset(&narrow);

@@ -66,7 +66,7 @@ pub struct Term {
     /// SI unit.
     pub unit: &'static str,
     /// Its range in the table `[search]` of `stage.toml`: see
-    /// [`SearchRanges::of`](hallstage_input::stage::SearchRanges::of). A lever arm's follows from the
+    /// [`SearchRanges::of`](hallstage_input::stage::SearchRanges::get). A lever arm's follows from the
     /// coordinates' ranges instead.
     pub range_key: &'static str,
     /// The motion that shows it, for A, B, C in the directions of the paper; see

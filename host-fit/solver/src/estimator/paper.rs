@@ -138,7 +138,7 @@ pub fn search_box(
             arms_m[id.probe]
         } else {
             let held = Range::new(id.term.fixed, id.term.fixed);
-            let ranges = stage.search.of(id.term.range_key);
+            let ranges = stage.search.get(id.term.range_key);
             let mut range = ranges.map_or(held, |ranges| ranges[id.probe]);
             if id.index < ETA {
                 range.low += stage.probes[id.probe].theta_rad;

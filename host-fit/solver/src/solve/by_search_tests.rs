@@ -71,7 +71,7 @@ fn the_cost_of_a_solution_is_that_of_its_own_parameters_and_zero_deviations() {
 fn a_gain_outside_its_box_is_kept_and_named() {
     let (mut stage, dataset) = (stage(), dataset(20, 5));
     // The truth is 0.87.
-    let mut eta = stage.search.of("eta").expect("known");
+    let mut eta = stage.search.get("eta").expect("known");
     eta[0].low = 0.9;
     stage.search.set("eta", eta);
     let problem = problem(&dataset, &stage, ModelKind::M31);

@@ -1,8 +1,8 @@
-//! The forms in which laboratories save logs.
+//! The forms of logs from laboratories.
 
 use super::*;
 
-/// The log with numbers of some columns divided by `by`, with so many decimals.
+/// The log with numbers of some columns divided by `by`, with `decimals` digits after the point.
 fn divided(columns: std::ops::Range<usize>, by: f64, decimals: usize) -> String {
     let mut lines = LOG.lines();
     let header = lines.next().expect("a header").to_owned() + "\n";
@@ -41,7 +41,7 @@ fn units_stand_in_the_header_in_every_spelling() {
     let mapped = stage_with("ifm_x = \"laser_nm\"");
     let other = LOG.replace("ifm_x_nm", "ifm_x [nm]");
     refused_with(&other, &mapped, &["(ifm_x [nm]): it is unknown"]);
-    // A name in [log] is that of the header, letter for letter, and its unit is read from it.
+    // A name in [log] stands in the header, letter for letter, and has the unit.
     let mapped = stage_with(
         "ifm_x = \"X [um]\"\nifm_y1 = \"Y left/um\"\nifm_y2 = { column = \"Y (right)\", unit = \"\u{b5}m\" }",
     );
@@ -136,7 +136,7 @@ fn utf_16_with_and_without_a_mark() {
         same_rows(&little, stage());
         same_rows(&big, stage());
         same_rows(gzip(&little), stage());
-        // The hash is that of the file, as another program would compute it.
+        // The hash of the file, as another program computes it.
         let hash = read_in(gzip(&big), stage()).expect("sound").dataset.sha256;
         assert_eq!(hash, <[u8; 32]>::from(Sha256::digest(&big)));
         let cut = read_in(&little[..little.len() - 1], stage()).expect_err("half a character");

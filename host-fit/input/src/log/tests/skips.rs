@@ -2,7 +2,6 @@ use super::*;
 
 const SKIP: ReadOptions = ReadOptions {
     bad_rows: BadRows::Skip,
-    rows_max: None,
     ..ReadOptions::FIT
 };
 
