@@ -158,21 +158,21 @@ fn main() -> Fallible<()> {
     );
     let mut all_met = true;
     for spacing_k in [3.0, 5.0] {
-        let mut by_change: [Ratios; 4] = Default::default();
+        let mut changes: [Ratios; 4] = Default::default();
         let mut off = Ratios::default();
         for seed in 1..=stages {
             let twin = Twin::new(&stage, seed);
             let cold = twin.planned(&RUN_30, steady(0.0));
             let warm = twin.planned(&RUN_8, steady(spacing_k));
             let fit = twin.fit(&[&cold, &warm])?;
-            for (ratios, change_k) in by_change.iter_mut().zip(CHANGES_K) {
+            for (ratios, change_k) in changes.iter_mut().zip(CHANGES_K) {
                 ratios.0.push(twin.judge(&fit, &twin.service(change_k))?);
             }
             let warm = changed(&warm, |read_mc| read_mc.map(|mc| mc + 100));
             let fit = twin.fit(&[&cold, &warm])?;
             off.0.push(twin.judge(&fit, &twin.service(10.0))?);
         }
-        for ((ratios, change_k), limits) in by_change.iter().zip(CHANGES_K).zip(LIMITS) {
+        for ((ratios, change_k), limits) in changes.iter().zip(CHANGES_K).zip(LIMITS) {
             let title = format!("run30, run8 {spacing_k} K warmer; service at {change_k:+} K");
             all_met &= ratios.print(&title, Some(limits));
         }

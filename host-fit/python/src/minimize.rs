@@ -104,7 +104,7 @@ impl CostFunction for Function<'_> {
         });
         if let Err(error) = done {
             self.has_failed.store(true, Ordering::Relaxed);
-            // The search ends after the first one.
+            // The search ends after the first exception.
             let _ = self.error.set(error);
         }
     }

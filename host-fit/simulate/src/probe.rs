@@ -167,8 +167,7 @@ fn slope_per_m(gap_m: f64) -> f64 {
     designed_magnet().field(at).z / STEP_M
 }
 
-/// The gap at which a probe over the designed magnet has this share of the designed sensitivity, m;
-/// within 2 to 12 mm.
+/// The gap for a share of the designed sensitivity, over the designed magnet, m; within 2 to 12 mm.
 pub fn gap_m(sensitivity: f64) -> f64 {
     let [mut near, mut far] = GAPS_M;
     let wanted = sensitivity * slope_per_m(DESIGNED_GAP_M);
