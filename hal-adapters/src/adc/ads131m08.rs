@@ -195,7 +195,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
     const fn wanted(&self, register: u8) -> u16 {
         match register {
             MODE_REGISTER => MODE_WANTED,
-            CLOCK => (self.channels.read_mask() as u16) << 8 | CLOCK_SPEED,
+            CLOCK => (self.channels.read as u16) << 8 | CLOCK_SPEED,
             CFG => CFG_WANTED,
             GAIN_0.. if (register - GAIN_0).is_multiple_of(CHANNEL_REGISTERS) => GAIN_WANTED,
             _ => 0,
@@ -289,7 +289,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     }
 
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
-        let (register, read) = (self.turn, self.channels.read_mask());
+        let (register, read) = (self.turn, self.channels.read);
         self.turn = if register < LAST_REGISTER {
             register + 1
         } else {

@@ -12,6 +12,8 @@ pub struct Channels {
     hall: [u8; 3],
     capacitive: [u8; 3],
     pub(super) thermometers: [Option<&'static Thermometer>; 2],
+    /// The inputs that are read, thermometers included: bit k for input k.
+    pub(super) read: u8,
 }
 
 impl Channels {
@@ -20,21 +22,22 @@ impl Channels {
         hall: [0, 1, 2],
         capacitive: [3, 4, 5],
         thermometers: [None; 2],
+        read: 0x3f,
     };
 
     /// The inputs of Hall probes A, B, C and of capacitive gaps 1, 2, 3; `None` unless all six are below 8 and
     /// differ.
     pub const fn new(hall: [u8; 3], capacitive: [u8; 3]) -> Option<Self> {
         let ([a, b, c], [d, e, f]) = (hall, capacitive);
-        let channels = Self {
+        let Some(read) = with_inputs(0, &[a, b, c, d, e, f]) else {
+            return None;
+        };
+        Some(Self {
             hall,
             capacitive,
             thermometers: [None; 2],
-        };
-        match with_inputs(0, &[a, b, c, d, e, f]) {
-            Some(_) => Some(channels),
-            None => None,
-        }
+            read,
+        })
     }
 
     /// With thermometers at the magnets' mount and on the stage body at the Hall elements; `None` unless their inputs
@@ -44,30 +47,20 @@ impl Channels {
         self,
         thermometers: [Option<&'static Thermometer>; 2],
     ) -> Option<Self> {
-        let with = Self {
-            thermometers,
-            ..self
+        let sensors = self.mask();
+        let read = match thermometers {
+            [Some(mount), Some(body)] => with_inputs(sensors, &[mount.input, body.input]),
+            [Some(one), None] | [None, Some(one)] => with_inputs(sensors, &[one.input]),
+            [None, None] => Some(sensors),
         };
-        match with.checked_mask() {
-            Some(_) => Some(with),
-            None => None,
-        }
-    }
-
-    /// The inputs that are read, thermometers included: bit k for input k.
-    pub(super) const fn read_mask(&self) -> u8 {
-        match self.checked_mask() {
-            Some(mask) => mask,
-            None => 0,
-        }
-    }
-
-    const fn checked_mask(&self) -> Option<u8> {
-        match self.thermometers {
-            [Some(mount), Some(body)] => with_inputs(self.mask(), &[mount.input, body.input]),
-            [Some(one), None] | [None, Some(one)] => with_inputs(self.mask(), &[one.input]),
-            [None, None] => Some(self.mask()),
-        }
+        let Some(read) = read else {
+            return None;
+        };
+        Some(Self {
+            thermometers,
+            read,
+            ..self
+        })
     }
 
     /// The inputs of the six sensors: bit k for input k.
@@ -125,7 +118,7 @@ mod tests {
         assert_eq!(with(None, Some(at(8))), None);
         assert_eq!(with(Some(at(6)), Some(at(6))), None);
         let both = with(Some(at(7)), Some(at(6))).expect("free");
-        assert_eq!((both.mask(), both.read_mask()), (0x3f, 0xff));
+        assert_eq!((both.mask(), both.read), (0x3f, 0xff));
         assert_eq!(with(None, None), Some(Channels::IN_ORDER));
     }
 

@@ -3,7 +3,6 @@
 //! feature in `Cargo.toml`. The pins are in the README beside this crate.
 
 use crate::spi::SpiDma;
-use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::thermometer::{Thermometer, ntc_103at, tmp235};
 use hal_adapters::adc::{Channels, FrameSampler};
@@ -215,7 +214,8 @@ pub fn set_up(
         .spi(pins, Converter::SPI_MODE, Hertz::from_raw(SPI_HZ), rcc)
         .release();
     let spi = SpiDma::new(spi1, dma2, rcc);
-    let spi = infallible(ExclusiveDevice::new_no_delay(spi, select));
+    // Writing to the pin cannot fail.
+    let Ok(spi) = ExclusiveDevice::new_no_delay(spi, select);
     // Without a transceiver the bus looks idle.
     gpiob
         .pb8
@@ -231,13 +231,5 @@ pub fn set_up(
         led: gpioc.pc1.into_push_pull_output(),
         servo: gpiob.pb1.into_pull_up_input(),
         not_pulled_up,
-    }
-}
-
-/// The value of a result that has no error: writing to these pins cannot fail.
-fn infallible<T>(result: Result<T, Infallible>) -> T {
-    match result {
-        Ok(value) => value,
-        Err(never) => match never {},
     }
 }

@@ -42,9 +42,12 @@ pub struct Bus {
     /// Ticks in a row while the controller took no part in the bus.
     apart_ticks: u16,
     was_off: bool,
-    bus_off: u32,
-    sent: u32,
-    overruns: u32,
+    /// Times the bus was off. Saturates.
+    pub bus_off: u32,
+    /// Frames handed to a mailbox.
+    pub sent: u32,
+    /// Times that a frame was lost because three were waiting. Saturates.
+    pub overruns: u32,
     /// Frames for the mailboxes.
     pub outbox: Outbox,
 }
@@ -188,21 +191,6 @@ impl Bus {
             self.outbox.pop();
             self.sent = self.sent.wrapping_add(1);
         }
-    }
-
-    /// Frames handed to a mailbox.
-    pub const fn sent(&self) -> u32 {
-        self.sent
-    }
-
-    /// Times that frames came while three were waiting, and one was lost. Saturates.
-    pub const fn overruns(&self) -> u32 {
-        self.overruns
-    }
-
-    /// Times the bus was off.
-    pub const fn bus_off(&self) -> u32 {
-        self.bus_off
     }
 
     /// The mailboxes that are not empty.

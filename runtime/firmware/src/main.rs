@@ -37,10 +37,6 @@ impl DelayNs for Cycles {
         const CYCLES_PER_US: u32 = board::CORE_HZ / 1_000_000;
         cortex_m::asm::delay((ns / 1000 + 1) * CYCLES_PER_US);
     }
-
-    fn delay_us(&mut self, us: u32) {
-        self.delay_ns(us.saturating_mul(1000));
-    }
 }
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
@@ -267,7 +263,7 @@ mod app {
             SCB::sys_reset();
         }
         local.facts.missed_ticks = local.schedule.missed();
-        local.facts.bus_off = bus.bus_off();
+        local.facts.bus_off = bus.bus_off;
         let is_low = local.records.flash().supply.is_low();
         (local.facts).note(board_check::SUPPLY_LOW, is_low);
         (local.facts).note(board_check::CAN_NOT_STARTED, !bus.takes_part());
@@ -299,9 +295,9 @@ mod app {
             *local.overrun_ticks,
             local.acquisition.faults(),
             local.acquisition.starts(),
-            bus.sent(),
+            bus.sent,
             bus.outbox.dropped(),
-            bus.overruns(),
+            bus.overruns,
             local.node.fpu_restored(),
         ];
         STAGE.put(tick.sequence, tick.started_us, &reading, counters);

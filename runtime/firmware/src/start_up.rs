@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_damaged_record_a_zero_may_have_been_lost() {
+    fn a_damaged_record_may_have_lost_a_zero() {
         let before = Before::new(Cause::Reset, None);
         assert!(before.record.zero.x_m.is_nan());
         assert!(!before.by_fault);

@@ -43,8 +43,10 @@ macro_rules! named {
     };
 }
 
+type Check = fn(&Bench);
+
 /// The checks.
-const CHECKS: &[(&str, fn(&Bench))] = &named! {
+const CHECKS: &[(&str, Check)] = &named! {
     figures: flash_and_ram, interrupt_to_mailbox;
     temperature: follow_the_stage;
     motion: a_pose_has_its_instant;

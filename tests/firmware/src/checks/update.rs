@@ -109,9 +109,11 @@ pub(super) fn updated(machine: &mut Machine, plan: &UpdateSettings) -> Updated {
 }
 
 pub(super) fn identity(machine: &mut Machine) -> Identity {
-    talk(machine, |talk| on::identify(talk))
-        .0
-        .expect("an identity")
+    let (identity, _) = talk(machine, |talk| {
+        let identity = on::identify(talk)?;
+        Ok(identity)
+    });
+    identity.expect("an identity")
 }
 
 /// The blob that runs, read over the bus.
