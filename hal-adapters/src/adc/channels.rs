@@ -73,7 +73,8 @@ impl Channels {
     pub(super) fn frame(&self, codes: &[i32; INPUTS], sequence: u32, time_us: u32) -> RawFrame {
         // Every index is below 8 already: the mask lets the compiler drop its check, and the panic.
         let code = |input: u8| codes[usize::from(input & 7)];
-        let (hall, capacitive) = (self.hall.map(code), self.capacitive.map(code));
+        let ([a, b, c], [d, e, f]) = (self.hall, self.capacitive);
+        let (hall, capacitive) = ([code(a), code(b), code(c)], [code(d), code(e), code(f)]);
         RawFrame::new(hall, capacitive, sequence, time_us)
     }
 }
