@@ -12,7 +12,9 @@ use runtime::parameters::Text;
 use std::vec::Vec;
 use std::{format, println};
 
-const SEEDS: u64 = 8;
+/// Courses of chance of a cut inside: many where the slot is dropped and erased and where the blob is committed, few
+/// between.
+const SEEDS: [u64; 2] = [64, 4];
 pub(crate) const SERIAL: Option<&str> = Some("HS-0007");
 
 /// A blob of the stage, in turn of both layouts and of another length.
@@ -122,9 +124,15 @@ fn cut_everywhere(scenario: &Scenario) -> usize {
     let (operations, mut cuts, mut confirmations) = (whole.operations, 0, 0);
     // The last operation comes after the confirmation: the cut hits the next start.
     for operation in 0..=operations {
+        let is_between = (3..operations - 4).contains(&operation);
         for cut in Cut::ALL {
             // Chance plays a part inside only.
-            for seed in 0..if cut == Cut::Inside { SEEDS } else { 2 } {
+            let seeds = if cut == Cut::Inside {
+                SEEDS[usize::from(is_between)]
+            } else {
+                2
+            };
+            for seed in 0..seeds {
                 let mut flash = scenario.flash.clone();
                 flash.seed(seed ^ (operation as u64) << 8);
                 flash.power_on();
