@@ -21,9 +21,9 @@ use serde_json::json;
 use std::array::from_fn;
 use std::collections::BTreeMap;
 
-/// Places of each axis at which poses are compared, in parts of its range.
+/// The grid along each axis, as a share of its range.
 const LEVELS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
-/// Steps towards the codes of a pose: each leaves a tenth of the way or less.
+/// Steps towards the codes of a pose. Each step reduces the distance to a tenth or less.
 const STEPS: u32 = 6;
 /// The parameters of both blobs by name, with k and h of the temperatures, SI: values `a` and `b`, null where the model has
 /// no such term; the change; and `sigma`, the change over the standard error of a difference between independent logs, null
@@ -54,9 +54,9 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
     Group(names.into_iter().map(change).collect())
 }
 
-/// The second blob's pose less the first one's, by the decoder of the target, over the codes of a grid of poses: the codes
-/// at which the first blob reads nearly these poses. Its range is the one for which both are calibrated; `refused` counts
-/// poses that one of them does not decode. `None` where the geometry of the first blob cannot be inverted.
+/// The second blob's pose less the first one's, by the decoder of the target, over codes at which the first blob reads a grid of
+/// poses. The grid covers the range of calibration that both blobs share. `refused` counts poses that either blob does not
+/// decode. `None` where the geometry of the first blob cannot be inverted.
 pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
     let range_of = |set: &ParameterSet| {
         let c = &set.constants;

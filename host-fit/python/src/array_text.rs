@@ -105,7 +105,7 @@ impl ArrayText {
         Ok(())
     }
 
-    /// The text: digits enough that each number is read as it was.
+    /// The text: enough digits to restore each number.
     pub fn bytes(&self) -> Vec<u8> {
         let names: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
         let mut text = names.join(",").into_bytes();

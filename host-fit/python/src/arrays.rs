@@ -8,8 +8,8 @@ use numpy::{
 use pyo3::intern;
 use pyo3::prelude::*;
 
-/// The argument as an array of numbers with at least a row: one number each, or so many columns; `kinds` are
-/// those of its dtype that will do.
+/// The argument as an array of numbers with at least one row, each of one number or of `columns`. `kinds` are the accepted
+/// kinds of its dtype.
 fn array<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,
@@ -23,7 +23,7 @@ fn array<'py>(
     if given.is_instance(&masked)? {
         return Err(wrong(
             argument,
-            "a masked array, whose mask would be lost; leave the masked rows out",
+            "a masked array; remove the masked rows, since the mask would be lost",
         ));
     }
     let made = numpy.call_method1("asarray", (given,));
@@ -121,7 +121,7 @@ pub fn reals<'py>(
     Ok(laid_out.try_readonly()?)
 }
 
-/// Numbers of so many columns, (n, columns), in `f64`.
+/// Numbers, (n, columns), in `f64`.
 pub fn table<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,

@@ -2,7 +2,7 @@
 
 use crate::choice::chosen;
 use crate::decoder::{self, Decoder};
-use crate::error::{internal, of_output, of_recalibrate, refused, wrong};
+use crate::error::{internal, output_error, recalibrate_error, refused, wrong};
 use crate::evaluation::Evaluation;
 use crate::finding;
 use crate::fit::blob_text;
@@ -45,7 +45,7 @@ pub struct Calibration {
 
 impl Calibration {
     /// Of a fit that has a blob, with its report.
-    pub fn of_fit(
+    pub fn from_fit(
         outcome: Outcome,
         report: Report,
         log: Arc<LogReading>,
@@ -95,7 +95,8 @@ impl Calibration {
     }
 
     fn blob_bytes(&self) -> PyResult<Vec<u8>> {
-        blob_file::to_bytes(Path::new("params.bin"), &self.set).map_err(|error| of_output(&error))
+        blob_file::to_bytes(Path::new("params.bin"), &self.set)
+            .map_err(|error| output_error(&error))
     }
 }
 
@@ -104,7 +105,7 @@ impl Calibration {
     /// Reads a parameter blob, and what is known of its errors if `params.bin.posterior` stands beside it.
     ///
     /// Raises `OSError` where it cannot be read, `ValueError` where it is no sound blob, or one for other
-    /// scales than those of the stage.
+    /// scales than the stage has.
     #[staticmethod]
     fn open(path: PathBuf, stage: Py<Stage>) -> PyResult<Self> {
         let (set, known) = decoder::read(&path)?;
@@ -132,7 +133,7 @@ impl Calibration {
             posterior_file::add_calibration(&mut outputs, &path, &self.set, known)?;
             outputs.commit()
         });
-        written.map(drop).map_err(|error| of_output(&error))
+        written.map(drop).map_err(|error| output_error(&error))
     }
 
     /// The parameter blob, as a controller takes it.
@@ -158,7 +159,7 @@ impl Calibration {
         &self.set.serial
     }
 
-    /// Creation time, as it was given.
+    /// Creation time, as given.
     #[getter]
     fn created(&self) -> &str {
         &self.set.created
@@ -170,7 +171,7 @@ impl Calibration {
         self.set.fit.forced
     }
 
-    /// "good", "limited" or "refused"; None where it is not known.
+    /// "good", "limited" or "refused", or None where that is not known.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let verdict = self
@@ -289,7 +290,7 @@ impl Calibration {
     /// `what` has changed: "gain" of all probes (2 s of a sine along Y), "gains" of each probe (2 s of X, Y, Rz
     /// at once), "all" (8 s of all six axes at once, as after a probe was seated anew), "temperature" (a run
     /// of 8 s at another one adds to k and h). `created`: creation time for the blob. Raises `LogRefused` where
-    /// the log does not tell that, `ValueError` of other models or where `all` lacks the posterior.
+    /// the log does not determine that, `ValueError` of other models or where `all` lacks the posterior.
     #[pyo3(signature = (log, what, *, created = ""))]
     fn recalibrate(
         &self,
@@ -305,7 +306,7 @@ impl Calibration {
         let (reading, designed) = (&log.reading, &log.designed);
         let blob = (&self.set, self.known.as_ref());
         let updated = work::run(py, || Updated::new(blob, reading, designed, what, created))?;
-        let updated = updated.map_err(|error| of_recalibrate(py, &error))?;
+        let updated = updated.map_err(|error| recalibrate_error(py, &error))?;
         if let Some(refusal) = &updated.refusal {
             return Err(refused(py, refusal, &updated.new.diagnosis.findings));
         }
@@ -318,7 +319,7 @@ impl Calibration {
         })
     }
 
-    /// What is different from an `older` calibration, a dict: `parameters` by name (a: older, b: this one,
+    /// The difference from an `older` calibration, a dict: `parameters` by name (a: older, b: newer,
     /// change, sigma) and `pose_difference`, by the decoder over their common range, um and urad.
     fn diff<'py>(&self, py: Python<'py>, older: PyRef<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let [before, now] = [older.known(), self.known()];

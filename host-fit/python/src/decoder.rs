@@ -1,7 +1,7 @@
 //! Poses from codes, by the code that runs on the target.
 
 use crate::arrays::{codes, reals, same_rows, slice};
-use crate::error::{of_blob, of_log, of_posterior, wrong};
+use crate::error::{blob_error, log_error, posterior_error, wrong};
 use crate::log::Log;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 /// Words of a record: X, Y, Rz, Z, Rx, Ry, status.
 const WORDS: usize = 7;
-/// The fields of a record, as those of `host-fit decode --format npy`.
+/// The fields of a record, as in `host-fit decode --format npy`.
 const FIELDS: [(&str, &str); WORDS] = [
     ("x_m", "<f4"),
     ("y_m", "<f4"),
@@ -76,7 +76,7 @@ impl Decoder {
     /// is read where it lies. Or of a `log`: all its rows, as `host-fit decode` does; a gap in its times
     /// shows as missed frames.
     ///
-    /// Raises `ValueError` that names the argument whose shape or dtype is wrong.
+    /// Raises `ValueError` with the name of an argument of wrong shape or dtype.
     #[pyo3(signature = (log = None, *, hall = None, caps = None, mount = None, body = None, hold = 0))]
     #[expect(
         clippy::too_many_arguments,
@@ -98,7 +98,7 @@ impl Decoder {
         };
         let (hall, caps) = match (log, hall, caps) {
             (Some(log), None, None) if mount.is_none() && body.is_none() => {
-                return records(py, self.of_log(py, log.get(), on_invalid)?);
+                return records(py, self.statuses(py, log.get(), on_invalid)?);
             }
             (None, Some(hall), Some(caps)) => (hall, caps),
             (Some(_), ..) => {
@@ -179,7 +179,7 @@ impl Decoder {
         &self.set.serial
     }
 
-    /// Creation time, as it was given.
+    /// Creation time, as given.
     #[getter]
     fn created(&self) -> &str {
         &self.set.created
@@ -218,7 +218,7 @@ impl Decoder {
     }
 
     /// The words of all rows of a log.
-    fn of_log(&self, py: Python<'_>, log: &Log, on_invalid: OnInvalid) -> PyResult<Vec<u32>> {
+    fn statuses(&self, py: Python<'_>, log: &Log, on_invalid: OnInvalid) -> PyResult<Vec<u32>> {
         let decoder = &self.decoder;
         let decoded = work::run(py, || {
             let mut tracker = PoseTracker::new(decoder, on_invalid);
@@ -234,20 +234,20 @@ impl Decoder {
             });
             read.map(|_: LogReading| words)
         })?;
-        decoded.map_err(|error| of_log(py, &error))
+        decoded.map_err(|error| log_error(py, &error))
     }
 }
 
 /// A blob, and what stands beside it.
 pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<StoredPosterior>)> {
-    let set = blob_file::read(path).map_err(|error| of_blob(&error))?;
+    let set = blob_file::read(path).map_err(|error| blob_error(&error))?;
     let beside = posterior_file::beside(path).filter(|path| path.exists());
     let known = beside.map(|beside| posterior_file::read(&beside, &set, path));
-    let known = known.transpose().map_err(|error| of_posterior(&error))?;
+    let known = known.transpose().map_err(|error| posterior_error(&error))?;
     Ok((set, known))
 }
 
-/// Codes by row, without those of other pieces.
+/// Codes by row of this piece.
 struct Rows<'a> {
     hall: &'a [[i32; 3]],
     caps: &'a [[i32; 3]],

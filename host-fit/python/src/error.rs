@@ -1,4 +1,4 @@
-//! The library's errors as Python's exceptions. Those of their own stand in `hallstage._errors`.
+//! The library's errors as Python's exceptions. The classes of the package stand in `hallstage._errors`.
 
 use host_fit::calibrate::CalibrateError;
 use host_fit::calibration::recalibrate::RecalibrateError;
@@ -31,11 +31,11 @@ fn own<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> Py
 }
 
 /// A log that is refused: `LogError`, or `OSError` where its file cannot be read.
-pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
+pub fn log_error(py: Python<'_>, error: &LogError) -> PyErr {
     use SourceProblem::{Interrupted, IsFolder, NotFound, Unreadable};
     match &error.problem {
         LogProblem::Source(of @ (Interrupted | NotFound | IsFolder | Unreadable { .. })) => {
-            of_source(of, error.to_string())
+            source_error(of, error.to_string())
         }
         _ => {
             let place = &error.place;
@@ -48,14 +48,14 @@ pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
 }
 
 /// A log that arrays made, by argument and row: a header stands above its rows.
-pub fn of_arrays(py: Python<'_>, error: &LogError, arguments: &[(String, String)]) -> PyErr {
+pub fn arrays_error(py: Python<'_>, error: &LogError, arguments: &[(String, String)]) -> PyErr {
     let place = &error.place;
     let named = |(header, _): &&(String, String)| {
         (place.column.as_ref()).is_some_and(|(_, name)| name == header)
     };
     let row = place.line.and_then(|line| line.checked_sub(2));
     let (Some((_, argument)), Some(row)) = (arguments.iter().find(named), row) else {
-        return of_log(py, error);
+        return log_error(py, error);
     };
     let said = format!("{argument}[{row}]: {}", error.problem);
     let column = place.column.as_ref().map(|(column, _)| *column);
@@ -75,22 +75,22 @@ pub fn refused(py: Python<'_>, why: &str, findings: &[Finding]) -> PyErr {
     )
 }
 
-pub fn of_calibrate(error: &CalibrateError) -> PyErr {
+pub fn calibrate_error(error: &CalibrateError) -> PyErr {
     match error {
         CalibrateError::Unsupported(error) => wrong("project", error),
         CalibrateError::Interrupted(_) => PyKeyboardInterrupt::new_err(()),
     }
 }
 
-pub fn of_stage(error: &StageError) -> PyErr {
+pub fn stage_error(error: &StageError) -> PyErr {
     match error {
-        StageError::Source(source) => of_source(&source.problem, error.to_string()),
+        StageError::Source(source) => source_error(&source.problem, error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
 
 /// A file that cannot be read.
-fn of_source(problem: &SourceProblem, message: String) -> PyErr {
+fn source_error(problem: &SourceProblem, message: String) -> PyErr {
     match problem {
         SourceProblem::NotFound => PyFileNotFoundError::new_err(message),
         SourceProblem::Interrupted => PyKeyboardInterrupt::new_err(()),
@@ -98,26 +98,26 @@ fn of_source(problem: &SourceProblem, message: String) -> PyErr {
     }
 }
 
-pub fn of_blob(error: &BlobFileError) -> PyErr {
+pub fn blob_error(error: &BlobFileError) -> PyErr {
     match error {
-        BlobFileError::Read(source) => of_source(&source.problem, error.to_string()),
+        BlobFileError::Read(source) => source_error(&source.problem, error.to_string()),
         BlobFileError::Unusable { .. } => PyValueError::new_err(error.to_string()),
     }
 }
 
-pub fn of_posterior(error: &PosteriorFileError) -> PyErr {
+pub fn posterior_error(error: &PosteriorFileError) -> PyErr {
     match error {
-        PosteriorFileError::Read(source) => of_source(&source.problem, error.to_string()),
+        PosteriorFileError::Read(source) => source_error(&source.problem, error.to_string()),
         PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
 
-pub fn of_output(error: &OutputError) -> PyErr {
+pub fn output_error(error: &OutputError) -> PyErr {
     PyOSError::new_err(error.to_string())
 }
 
-pub fn of_recalibrate(py: Python<'_>, error: &RecalibrateError) -> PyErr {
+pub fn recalibrate_error(py: Python<'_>, error: &RecalibrateError) -> PyErr {
     match error {
         RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => {
             PyValueError::new_err(error.to_string())

@@ -1,7 +1,7 @@
 //! A calibration judged on another log.
 
 use crate::choice::chosen;
-use crate::error::{of_log, wrong};
+use crate::error::{log_error, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::report::{About, head, residuals, text, write};
@@ -55,7 +55,7 @@ impl Evaluation {
                 log.read_for(Evaluated::OPTIONS, take)
             })
         })?;
-        let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
+        let evaluated = evaluated.map_err(|error| log_error(py, &error))?;
         Ok(Self {
             report: evaluated.report(started.elapsed().as_secs_f64()),
             evaluated,
@@ -93,7 +93,7 @@ impl Evaluation {
         self.report.warnings.clone()
     }
 
-    /// Why the calibration does not do for these logs, and what to do; None if it does.
+    /// Why the calibration does not describe these logs, and what to do, or None if it does.
     #[getter]
     fn refusal(&self) -> Option<String> {
         self.evaluated.refusal()

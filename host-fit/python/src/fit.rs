@@ -2,7 +2,7 @@
 
 use crate::calibration::Calibration;
 use crate::choice::chosen;
-use crate::error::{of_calibrate, refused, wrong};
+use crate::error::{calibrate_error, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
@@ -135,13 +135,13 @@ pub fn fit(
     };
     let stage = &log.designed;
     let made = work::run(py, || {
-        let of_log = (&*log.reading, &**stage);
+        let log_error = (&*log.reading, &**stage);
         let fitted = order.fit(&log.reading, stage)?;
         let outcome = order.judge(fitted, &log.reading, stage)?;
-        let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
+        let report = outcome.report(&order, log_error, started.elapsed().as_secs_f64());
         Ok((outcome, report))
     })?;
-    let (outcome, report) = made.map_err(|error| of_calibrate(&error))?;
+    let (outcome, report) = made.map_err(|error| calibrate_error(&error))?;
     // A search that was interrupted in another thread.
     if WATCH.is_stopped() {
         return Err(PyKeyboardInterrupt::new_err(()));
@@ -149,7 +149,7 @@ pub fn fit(
     match report {
         Some(report) if outcome.has_blob => {
             let (designed, stage) = (Arc::clone(stage), log.stage.clone_ref(py));
-            Calibration::of_fit(outcome, report, Arc::clone(&log.reading), designed, stage)
+            Calibration::from_fit(outcome, report, Arc::clone(&log.reading), designed, stage)
         }
         _ => {
             let why = outcome.refusal.as_deref().unwrap_or_default();

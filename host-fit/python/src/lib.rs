@@ -1,7 +1,7 @@
 //! The Python package `hallstage`: the library [`host_fit`] for NumPy and notebooks.
 //!
 //! One file a group of classes; each function reads its arguments, calls the library without the GIL,
-//! and hands over what it gives. Nothing is computed here.
+//! and returns its result. The package computes nothing itself.
 
 mod array_text;
 mod arrays;

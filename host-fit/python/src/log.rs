@@ -2,7 +2,7 @@
 
 use crate::array_text::ArrayText;
 use crate::choice::chosen;
-use crate::error::{of_arrays, of_log, wrong};
+use crate::error::{arrays_error, log_error, wrong};
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibrate::log_warnings;
@@ -60,8 +60,8 @@ fn options(bad_rows: &str, split_s: Option<f64>) -> PyResult<ReadOptions> {
 /// Reads logs of a stage, in every form that the program `host-fit` takes: CSV or CSV.gz, any separator,
 /// decimal commas, units in the header, UTF-16, dates as times.
 ///
-/// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to leave rows
-/// with a bad cell out and count them. `split_s`: length of the movements of a log that has no column for
+/// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to count rows with a
+/// bad cell and go on without them. `split_s`: length of the movements of a log that has no column for
 /// them, s; else they end at gaps in time alone.
 ///
 /// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
@@ -90,7 +90,7 @@ pub fn read_log(
     let options = options(bad_rows, split_s)?;
     let designed = Arc::clone(&stage.get().designed);
     let reading = work::run(py, || log::read(&paths, &designed, &options))?;
-    let reading = reading.map_err(|error| of_log(py, &error))?;
+    let reading = reading.map_err(|error| log_error(py, &error))?;
     Ok(Log {
         reading: Arc::new(reading),
         source: Source::Files(paths),
@@ -111,7 +111,7 @@ impl Log {
     /// where there is none. `units` of lengths: m, mm, um, nm, pm; `angles`: rad, mrad, urad, nrad, deg.
     /// `name` stands for the file in reports; `bad_rows`, `split_s` as for `read_log`.
     ///
-    /// Raises `ValueError` that names the argument whose shape, dtype or unit is wrong, and `LogError` for a
+    /// Raises `ValueError` with the name of an argument of wrong shape, dtype or unit, and `LogError` for a
     /// row, with `.line` the row from 0 and `.name` the argument.
     #[staticmethod]
     #[pyo3(signature = (
@@ -152,7 +152,7 @@ impl Log {
         text.whole("movement", movement)?;
         text.codes("hall", ["hall_a", "hall_b", "hall_c"], Some(hall))?;
         text.codes("caps", ["cap_1", "cap_2", "cap_3"], caps)?;
-        // A third beam or none: the key of x is that of the beam or of the pose.
+        // With a second beam x is a beam, else it is the pose.
         let x_key = if y1.is_some() || y2.is_some() {
             "ifm_x"
         } else {
@@ -170,7 +170,7 @@ impl Log {
         for (column, argument, given) in [(MOUNT, "mount", mount), (BODY, "body", body)] {
             text.optional(column, argument, given)?;
         }
-        Self::of_text(
+        Self::from_text(
             py,
             &text.bytes(),
             Path::new(name),
@@ -319,7 +319,7 @@ const BODY: &str = "body_c";
 impl Log {
     /// Of the text of a log, and where its columns come from if arrays made it: name in the header and name
     /// of the argument.
-    pub fn of_text(
+    pub fn from_text(
         py: Python<'_>,
         text: &[u8],
         name: &Path,
@@ -327,8 +327,8 @@ impl Log {
         options: &ReadOptions,
         arguments: &[(String, String)],
     ) -> PyResult<Self> {
-        let of_stage = &stage.get().designed;
-        // Columns have names of their own here, whatever those of the stage's files.
+        let base = &stage.get().designed;
+        // The columns of arrays have their own names.
         let mut layout = LogLayout::default();
         // Temperatures are none of its quantities.
         layout.ignored = vec![MOUNT.to_owned(), BODY.to_owned()];
@@ -337,12 +337,12 @@ impl Log {
             temperature: TemperatureTable {
                 columns: [Some(MOUNT.to_owned()), Some(BODY.to_owned())],
                 scale_mc: [1e3, 0.0],
-                ..of_stage.temperature.clone()
+                ..base.temperature.clone()
             },
-            ..Designed::clone(of_stage)
+            ..Designed::clone(base)
         });
         let reading = work::run(py, || log::read_bytes(text, name, &designed, options))?;
-        let reading = reading.map_err(|error| of_arrays(py, &error, arguments))?;
+        let reading = reading.map_err(|error| arrays_error(py, &error, arguments))?;
         Ok(Self {
             reading: Arc::new(reading),
             source: Source::Text(text.to_vec(), name.to_owned()),
@@ -402,7 +402,7 @@ impl Log {
         }
         match self.read_for(ReadOptions::FIT, |_, _| ()) {
             Ok(_) => Ok(()),
-            Err(error) => Err(of_log(py, &error)),
+            Err(error) => Err(log_error(py, &error)),
         }
     }
 }

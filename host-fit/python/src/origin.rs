@@ -1,4 +1,4 @@
-//! What a calibration comes from, and what that says of it.
+//! The origin of a calibration: a fit, an update or files.
 
 use host_fit::calibrate::{Outcome, Updated};
 use host_fit::calibration::diagnose::Diagnosis;
@@ -8,7 +8,7 @@ use host_fit::report::result::Report;
 use host_fit::report::verdict::Subject;
 use std::sync::Arc;
 
-/// What a calibration comes from.
+/// The origin of a calibration.
 pub enum Origin {
     Fit(Box<OfFit>),
     Update(Box<Updated>),

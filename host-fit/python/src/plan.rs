@@ -2,7 +2,7 @@
 
 use crate::arrays::{slice, table};
 use crate::choice::chosen;
-use crate::error::{internal, of_log, of_output, wrong};
+use crate::error::{internal, log_error, output_error, wrong};
 use crate::log::{Log, Source};
 use crate::minimize::whole;
 use crate::stage::Stage;
@@ -63,7 +63,7 @@ impl Plan {
     /// Writes the trajectory: columns t_us, x_um, y_um, rz_urad, z_um, rx_urad, ry_urad, a row for each servo
     /// period. Raises `OSError` where it cannot be written.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        write_atomically(&path, self.csv().as_bytes()).map_err(|error| of_output(&error))
+        write_atomically(&path, self.csv().as_bytes()).map_err(|error| output_error(&error))
     }
 
     fn __repr__(&self) -> String {
@@ -135,7 +135,7 @@ pub fn simulate<'py>(
         error => wrong("run", error),
     })?;
     let log = Log {
-        reading: Arc::new(reading.map_err(|error| of_log(py, &error))?),
+        reading: Arc::new(reading.map_err(|error| log_error(py, &error))?),
         source: Source::Text(csv.into_bytes(), "simulated".into()),
         options: ReadOptions::FIT,
         designed,

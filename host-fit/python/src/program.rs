@@ -1,6 +1,6 @@
 //! The program `host-fit`, and the logs that it brings.
 
-use crate::error::of_output;
+use crate::error::output_error;
 use host_fit::input::shipped::FILES;
 use host_fit::output::{make_folder, write_atomically};
 use pyo3::prelude::*;
@@ -29,10 +29,10 @@ pub fn main_of(python: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// cannot be written.
 #[pyfunction]
 pub fn write_demo(folder: PathBuf) -> PyResult<()> {
-    make_folder(&folder).map_err(|error| of_output(&error))?;
+    make_folder(&folder).map_err(|error| output_error(&error))?;
     for (name, bytes) in FILES {
         let written = write_atomically(&folder.join(name), bytes);
-        written.map_err(|error| of_output(&error))?;
+        written.map_err(|error| output_error(&error))?;
     }
     Ok(())
 }

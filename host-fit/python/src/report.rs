@@ -1,6 +1,6 @@
 //! What calibrations and evaluations show alike: verdict and findings in a notebook, residuals, a page.
 
-use crate::error::{internal, of_output, wrong};
+use crate::error::{internal, output_error, wrong};
 use crate::log::rows_of_three;
 use host_fit::calibration::words::message;
 use host_fit::input::dataset::Dataset;
@@ -114,5 +114,5 @@ pub fn write(
             "a folder; name a file, such as certificate.html",
         ));
     }
-    write_atomically(path, html.as_bytes()).map_err(|error| of_output(&error))
+    write_atomically(path, html.as_bytes()).map_err(|error| output_error(&error))
 }

@@ -1,6 +1,6 @@
 //! The stage as designed.
 
-use crate::error::{of_stage, wrong};
+use crate::error::{stage_error, wrong};
 use host_fit::input::axis::{AXES, PROBES};
 use host_fit::input::stage::Stage as Designed;
 use host_fit::report::figure::{Figure, bare, micro};
@@ -60,7 +60,7 @@ impl Stage {
         let text = all.to_string();
         let designed = Designed::from_toml(&text, Path::new("Stage(...)"));
         Ok(Self {
-            designed: Arc::new(designed.map_err(|error| of_stage(&error))?),
+            designed: Arc::new(designed.map_err(|error| stage_error(&error))?),
             path: None,
         })
     }
@@ -70,7 +70,7 @@ impl Stage {
     /// Raises `OSError` where it cannot be read, `ValueError` with line and key where it is wrong.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        let designed = Designed::from_file(&path).map_err(|error| of_stage(&error))?;
+        let designed = Designed::from_file(&path).map_err(|error| stage_error(&error))?;
         Ok(Self {
             designed: Arc::new(designed),
             path: Some(path),

@@ -71,7 +71,7 @@ impl Statistics<'_> {
         class.call1((array, names))
     }
 
-    /// The parameters as a dict of `hallstage.Parameter`, those of the covariance first, in its order.
+    /// The parameters as a dict of `hallstage.Parameter`, in the order of the covariance; parameters without one follow.
     pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let class = py.import("hallstage._results")?.getattr("Parameter")?;
         let errors = self.standard_errors();

@@ -26,11 +26,10 @@ pub const WATCH: Watch<'static> = Watch {
     },
 };
 
-/// Does `work` in a thread of its own, while this one looks for signals and shows the progress.
+/// Does `work` in a thread of its own. The calling thread looks for signals and shows the progress.
 ///
 /// # Errors
-/// What a signal raises, such as `KeyboardInterrupt`. The work has ended then: what it would have given is
-/// dropped.
+/// What a signal raises, such as `KeyboardInterrupt`. The work has ended then, without a result.
 pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let (done, wait) = channel();
     let started = Instant::now();

@@ -1,4 +1,4 @@
-"""Fits, what they know, and that they are those of the program."""
+"""Fits and their results, which equal the results of the program."""
 
 import json
 import signal

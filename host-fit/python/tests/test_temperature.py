@@ -1,4 +1,4 @@
-"""A stage that warms at work: its logs, its calibration, and that they are those of the program."""
+"""A stage that warms in service: its logs and its calibration, which equal the program's."""
 
 from pathlib import Path
 

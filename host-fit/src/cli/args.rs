@@ -38,7 +38,7 @@ pub(super) struct Logs {
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) stage: StageFile,
-    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// Logs without a column for the movement: begin one after this many seconds, not only after gaps
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = movement_seconds)]
     split: Option<f64>,

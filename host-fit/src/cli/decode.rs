@@ -32,7 +32,7 @@ pub(super) struct DecodeArgs {
     /// Where to write the poses.
     #[arg(long, value_name = "pose.csv")]
     out: PathBuf,
-    /// Repeat the last valid pose for at most so many rows where codes are bad.
+    /// Repeat the last valid pose for at most N rows where codes are bad.
     #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
     hold: OnInvalid,
     /// Add the standard uncertainty of X, Y, Rz to each line, by parameters and noise: three

@@ -39,7 +39,7 @@ use std::time::Instant;
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub(super) struct DemoArgs {
-    /// Where to leave logs, stage.toml, both blobs and pose.csv; a temporary folder if not given.
+    /// Where to keep logs, stage.toml, both blobs and pose.csv; a temporary folder if not given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -88,7 +88,7 @@ impl Display for HostError {
 
 impl HostError {
     /// Why a fit was not tried, or not kept.
-    pub(super) fn of_fit(error: CalibrateError) -> Self {
+    pub(super) fn from_calibrate(error: CalibrateError) -> Self {
         match error {
             CalibrateError::Unsupported(error) => Self::usage("--project", error),
             CalibrateError::Interrupted(kept) => Self::interrupted(kept),
@@ -96,7 +96,7 @@ impl HostError {
     }
 
     /// Settings of a fit that do not go together.
-    pub(super) fn of_mismatch(Mismatch { argument, problem }: Mismatch) -> Self {
+    pub(super) fn from_mismatch(Mismatch { argument, problem }: Mismatch) -> Self {
         Self::usage(&format!("--{argument}"), problem)
     }
 }

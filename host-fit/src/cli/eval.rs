@@ -24,8 +24,8 @@ pub(super) struct EvalArgs {
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
     #[arg(long, value_parser = choice::<Zeros<'static>>())]
     delta: Option<Zeros<'static>>,
-    /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
-    /// and 10 for models (12) to (31), whose own logs may not show what they lack.
+    /// Largest rms error as a multiple of the error on the logs that the blob was fitted to: 3 if not given, and 10 for
+    /// models (12) to (31), because their own logs may hide their errors.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     limit: Option<f64>,
     #[command(flatten)]

@@ -30,7 +30,7 @@ pub(super) struct ExportArgs {
     /// Where in flash, in place of both slots of memory.x: a number, or 0x and a hexadecimal one.
     #[arg(long, value_name = "A", value_parser = address)]
     address: Option<u32>,
-    /// One slot alone, 0 or 1: what the controller has stored in the other may be newer, and run.
+    /// One slot alone, 0 or 1: the parameters in the other slot may be newer, and run.
     #[arg(long, value_name = "0|1", conflicts_with = "address")]
     slot: Option<u8>,
     /// Where to write; next to the blob, named after the first address, if not given.

@@ -94,7 +94,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let inputs = args.logs.inputs().chain(args.start.as_deref());
     super::check_outputs(outputs, &args.report, inputs)?;
     let loss = choose_loss(args.loss, args.model, args.solver, args.project);
-    let loss = loss.map_err(HostError::of_mismatch)?;
+    let loss = loss.map_err(HostError::from_mismatch)?;
     interrupt::watch();
     let stage = args.logs.stage.read()?;
     let log = args.logs.read(
@@ -109,9 +109,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         limits: args.limit.unwrap_or_default(),
     };
     let fitted = terminal::timed("fit", || order.fit(&log, &stage));
-    let fitted = fitted.map_err(HostError::of_fit)?;
+    let fitted = fitted.map_err(HostError::from_calibrate)?;
     let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
-    let outcome = outcome.map_err(HostError::of_fit)?;
+    let outcome = outcome.map_err(HostError::from_calibrate)?;
     let of_log = (&log, &stage);
     let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
     let mut outputs = Outputs::default();

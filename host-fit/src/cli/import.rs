@@ -48,7 +48,7 @@ pub(super) struct ImportArgs {
         value_parser = search_seconds
     )]
     search_s: f64,
-    /// Only frames of this interface, where the record holds several; can0@5 for those of node 5.
+    /// Only frames of this interface, where the record holds several; can0@5 for the frames of node 5.
     #[arg(long, value_name = "IFACE")]
     interface: Option<BusAddress>,
     /// How codes are put into frames; auto: as the first frame with codes shows.

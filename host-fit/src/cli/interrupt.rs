@@ -19,7 +19,7 @@ pub(super) const EXIT_STATUS: u8 = 130;
 pub(super) fn watch() -> Watch<'static> {
     // The handler needs a thread. Where none can be started it would take Ctrl-C and do nothing.
     if std::thread::Builder::new().spawn(|| ()).is_ok() {
-        // Fails only where a handler is set already: then that one stays in charge.
+        // Fails only where a handler is set already, and that handler stays.
         let _ = ctrlc::set_handler(|| {
             if STOP.swap(true, Ordering::Relaxed) {
                 std::process::exit(EXIT_STATUS.into());

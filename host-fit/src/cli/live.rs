@@ -20,31 +20,31 @@ pub(super) struct LiveArgs {
     /// The parameter blob.
     #[arg(value_name = "params.bin")]
     params: PathBuf,
-    /// Refuse a blob of another stage than the one with this serial number.
+    /// Refuse a blob unless its stage has this serial number.
     #[arg(long, value_name = "TEXT")]
     serial: Option<String>,
     /// Record every frame received and sent, as `candump -L` does, in a new file.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Repeat the last valid pose for at most so many ticks where codes are bad.
+    /// Repeat the last valid pose for at most N ticks where codes are bad.
     #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
     hold: OnInvalid,
-    /// Send each vertical axis in every so many ticks: 1, 2, 4, 8 or 16.
+    /// Ticks from one message of a vertical axis to the next: 1, 2, 4, 8 or 16.
     #[arg(long, value_name = "TICKS", default_value_t = 4, value_parser = vertical_ticks)]
     vertical_every: u8,
     /// Send nothing: only watch, record and show.
     #[arg(long)]
     listen_only: bool,
-    /// End after so many seconds; without it, on Ctrl-C.
+    /// End after this many seconds; without it, on Ctrl-C.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
     /// Seconds from line to line where output is no terminal.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     every: Duration,
-    /// Give up a tick whose frames are not all there after so long.
+    /// Give up a tick if frames are still missing after this time.
     #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     assembly_us: u32,
-    /// Call the sensors stale after so long without a good frame.
+    /// Call the sensors stale after this time without a good frame.
     #[arg(long, value_name = "US", default_value_t = 3_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     stale_us: u32,
 }

@@ -1,4 +1,4 @@
-//! The command line: what the commands take and print, and with which exit status they end.
+//! The command line: arguments, printed texts and exit status of each command.
 //! One file a command; the work is the library's.
 
 mod args;
@@ -33,7 +33,9 @@ mod update;
 
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
-use crate::output::{blob_file, check_writable, is_standard, is_standard_output, keep_apart};
+use crate::output::{
+    blob_file, check_writable, is_standard, is_standard_output, keep_apart, posterior_file,
+};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
@@ -171,11 +173,11 @@ fn run(cli: &Cli) -> u8 {
     if !cli.quiet {
         progress::want();
     }
-    threads::start(match &cli.command {
+    let started = threads::start(match &cli.command {
         Command::Fit(args) => args.threads.number,
         _ => None,
     });
-    match cli.command.run() {
+    match started.and_then(|()| cli.command.run()) {
         Ok(()) => 0,
         // Who reads standard output, as `head` does, has seen enough.
         Err(error) if terminal::is_closed(&error) => 0,
@@ -192,7 +194,7 @@ fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
     paths.into_iter().try_for_each(line)
 }
 
-/// Refuses outputs that are an input or one another, and outputs that cannot be written: before the work. Where one
+/// Refuses outputs that are an input, the posterior beside one, or one another, and outputs that cannot be written: before the work. Where one
 /// goes to standard output, nothing else does from now on.
 fn check_outputs<'p>(
     outputs: impl IntoIterator<Item = Option<&'p Path>>,
@@ -212,6 +214,12 @@ fn check_outputs<'p>(
     let new = report.folder.as_deref().filter(|folder| !folder.exists());
     let page = report.page().filter(|_| new.is_none());
     outputs.extend(page.as_deref());
+    let beside: Vec<_> = (inputs.iter())
+        .filter_map(|path| posterior_file::beside(path))
+        .collect();
+    let inputs = inputs
+        .into_iter()
+        .chain(beside.iter().map(PathBuf::as_path));
     keep_apart(outputs.iter().copied().chain(new), inputs)?;
     Ok(outputs.into_iter().try_for_each(check_writable)?)
 }

@@ -23,7 +23,7 @@ pub(super) struct RecordArgs {
     out: PathBuf,
     #[command(flatten)]
     key: KeyFile,
-    /// End after so many seconds; without it, on Ctrl-C.
+    /// End after this many seconds; without it, on Ctrl-C.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<Duration>,
 }

@@ -1,7 +1,7 @@
 //! What goes to the terminal: tables to standard output, notes, warnings and errors to standard error.
 //!
 //! Where standard output carries an output of the command (`--json -`), tables go to standard error.
-//! Nothing that a file holds moves the cursor or begins a line here: see [`plain`].
+//! Text from a file cannot move the cursor or begin a line here: see [`plain`].
 
 use crate::cli::error::HostError;
 use crate::report::table::Table;

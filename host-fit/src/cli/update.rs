@@ -62,7 +62,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
     Ok(())
 }
 
-/// The blob, unless it belongs to another stage than the one asked for.
+/// The blob, unless it belongs to another stage than `--serial` says.
 fn read_blob(path: &Path, asked: Option<&str>) -> Result<Vec<u8>, HostError> {
     let set = blob_file::read(path)?;
     let own = set.serial.as_str();

@@ -36,7 +36,7 @@ const fn remedy(cause: &BlobError) -> &'static str {
     }
 }
 
-/// Reads a blob, whose file must hold exactly that, and checks it; from standard input for `-`.
+/// Reads and checks a blob; its file must hold nothing else. `-` is standard input.
 ///
 /// # Errors
 /// See [`BlobFileError`].

@@ -4,7 +4,7 @@ use super::is_standard;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// An output that was not written. The target is as it was before.
+/// An output that was not written. The target has not changed.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", if is_standard(path) { "standard output".into() } else { path.to_string_lossy() })]
 pub struct OutputError {
@@ -37,9 +37,7 @@ pub enum OutputProblem {
     #[error("is not in a folder but below a file; name another folder")]
     NotAFolder,
     /// A record is never replaced.
-    #[error(
-        "exists already, and a record is never replaced; name another file, or move this one away"
-    )]
+    #[error("exists already, and a record is never replaced; name another file, or move it away")]
     Exists,
     /// The target must not be written.
     #[error("the file is read-only; make it writable or name another")]
@@ -66,7 +64,7 @@ impl OutputError {
 
     /// The system's error in the user's terms.
     pub(super) fn from_system(path: &Path, source: Error) -> Self {
-        // `tempfile` wraps the system's error and adds the name of the temporary file, which tells the user nothing.
+        // `tempfile` wraps the system's error and adds the name of the temporary file, which the user does not know.
         let source = match source.raw_os_error() {
             Some(_) => source,
             None => source.kind().into(),

@@ -30,7 +30,7 @@ impl ExportFormat {
     }
 }
 
-/// Addresses of the parameter slots 0 and 1: those of the project's `memory.x`.
+/// Addresses of the parameter slots 0 and 1, as in the project's `memory.x`.
 pub const SLOTS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
 /// Why nothing is exported.

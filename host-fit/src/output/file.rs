@@ -9,7 +9,7 @@ use tempfile::NamedTempFile;
 /// An output while it is written.
 ///
 /// A regular file is written beside its target and replaces it when it is [finished](Self::finish). If it never is,
-/// nothing has changed. A killed program may leave a hidden file `.host-fit-…`, which can be deleted. A device, a
+/// nothing has changed. A hidden file `.host-fit-…` of a killed program can be deleted. A device, a
 /// pipe and standard output are written to directly.
 #[derive(Debug)]
 pub struct Output {
@@ -92,7 +92,7 @@ impl Output {
         written.map_err(|source| self.failed(source))
     }
 
-    /// Rewrites the first bytes of a [file](Self::is_file). Nothing can be added afterwards.
+    /// Rewrites the first bytes of a [file](Self::is_file). These must be its last bytes.
     ///
     /// # Errors
     /// [`OutputError`].
@@ -210,7 +210,7 @@ pub fn keep_apart<'p>(
     Ok(())
 }
 
-/// The form of a path in which two paths to one file are equal, whether the file exists or not.
+/// The canonical form of a path, also where the file does not exist yet. Two paths to one file have the same form.
 fn canonical(path: &Path) -> PathBuf {
     let path = match is_standard_output(path) {
         true => Path::new("/dev/stdout"),

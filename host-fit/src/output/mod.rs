@@ -73,7 +73,7 @@ impl Outputs {
         self.removed.push(path);
     }
 
-    /// Writes the streams, then replaces the files in the order in which they were added. Only a stream can still be
+    /// Writes the streams, then replaces the files in the order of `add`. Only a stream can still be
     /// full, and then no file has changed. A reader that closes standard output early, as `head` does, is no error.
     /// Returns the paths of all outputs.
     ///

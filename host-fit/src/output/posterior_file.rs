@@ -223,7 +223,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], StoredPosterior), Strin
     Ok((blob, known))
 }
 
-/// Whether a matrix is one, in the scale in which its diagonal is one.
+/// Whether a matrix is a covariance. It is scaled to a diagonal of ones first.
 fn is_covariance(matrix: &DMatrix<f64>) -> bool {
     let scale = matrix.diagonal().map(f64::sqrt);
     let (rows, columns) = matrix.shape();
@@ -236,10 +236,10 @@ mod tests {
     use super::*;
 
     fn known() -> StoredPosterior {
-        of_rows(COUNT)
+        known_with_rows(COUNT)
     }
 
-    fn of_rows(rows: usize) -> StoredPosterior {
+    fn known_with_rows(rows: usize) -> StoredPosterior {
         StoredPosterior {
             covariance: DMatrix::from_fn(rows, rows, |i, j| {
                 let size = |k: usize| 1e-6 * (1.0 + k as f64);
@@ -268,7 +268,7 @@ mod tests {
         };
         let bytes = encode(&[7; HASH_BYTES], &repaired);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], repaired)));
-        let with_temperature = of_rows(COUNT + 6);
+        let with_temperature = known_with_rows(COUNT + 6);
         let bytes = encode(&[7; HASH_BYTES], &with_temperature);
         assert_eq!(bytes.len(), 26_700 + 4_056);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_temperature)));

@@ -20,7 +20,7 @@ pub struct RecordFile {
     since: Instant,
     /// Bytes of the lines in the file.
     written: u64,
-    /// Whether a line is lost. None may follow.
+    /// Whether a line is lost. Then no line may follow.
     has_ended: bool,
 }
 

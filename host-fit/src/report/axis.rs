@@ -3,9 +3,9 @@
 /// An axis between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Axis {
-    /// Ends as they are.
+    /// Even distances.
     Linear(f64, f64),
-    /// Both ends above zero.
+    /// Both ends above zero, even decades.
     Logarithmic(f64, f64),
 }
 

@@ -5,7 +5,7 @@ use super::axis::{Axis, short};
 use serde::{Serialize, Serializer};
 use std::fmt::Write;
 
-/// Size in the units of the drawing, of which two are about a pixel: see `style.css`.
+/// Size in units of the drawing, about half a pixel each: see `style.css`.
 const WIDTH: f64 = 720.0;
 const PANEL_HEIGHT: f64 = 150.0;
 const TOP: f64 = 8.0;
@@ -14,7 +14,7 @@ const LEFT: f64 = 104.0;
 const RIGHT: f64 = 696.0;
 const MARGIN: f64 = 6.0;
 
-/// A role, to which the style sheet gives its colour by the value that the drawing has.
+/// A role. The style sheet gives each its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// What is shown.
@@ -92,7 +92,7 @@ impl Serialize for Chart {
 
 impl Chart {
     /// Three panels, of X, Y and Rz or of the probes, over an abscissa with a label.
-    pub fn of_three(
+    pub fn with_three_panels(
         caption: impl Into<String>,
         (x_label, x): (&str, Axis),
         panel: impl FnMut(usize) -> Panel,
@@ -105,7 +105,7 @@ impl Chart {
         }
     }
 
-    /// The chart as an `svg` element to stand in a page, whose style sheet gives the colours.
+    /// The chart as an `svg` element for a page. The style sheet of the page gives the colours.
     pub(super) fn svg(&self) -> String {
         let height = TOP + PANEL_HEIGHT * self.panels.len() as f64 + BOTTOM;
         let mut svg = format!("<svg role=\"img\" viewBox=\"0 0 {WIDTH} {height}\">\n");

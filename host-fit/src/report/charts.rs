@@ -1,5 +1,4 @@
-//! The charts of a report: what the log holds and the errors, over time; the errors against all that they
-//! may depend on, and their spectrum.
+//! The charts of a report: the errors over time, against pose, signals and temperatures, and their spectrum.
 
 use super::axis::Axis;
 use super::chart::{Chart, Mark, Panel, Scale, Tone};
@@ -62,7 +61,7 @@ pub(super) struct Log<'a> {
 }
 
 impl Log<'_> {
-    /// Where movements begin, unless there are so many that they would merge.
+    /// Where movements begin, unless their borders would merge.
     fn borders(&self) -> Mark {
         let starts = self.dataset.movements.iter().skip(1).map(|m| m.rows.start);
         let starts = starts.map(|row| row as f64 * self.period_s);
@@ -90,7 +89,7 @@ impl Log<'_> {
             let marks = std::iter::once(self.borders()).chain(series).collect();
             Panel::new(labels[k], Scale::Symmetric, marks)
         };
-        Chart::of_three(
+        Chart::with_three_panels(
             caption,
             ("time of the rows, s", Axis::Linear(0.0, end_s)),
             panel,
@@ -145,14 +144,15 @@ impl Log<'_> {
                 Panel::new(PLANAR[axis], Scale::Symmetric, marks)
             };
             let caption = format!("Errors against {}", name.split(',').next().unwrap_or(name));
-            (high > low).then(|| Chart::of_three(caption, (name, Axis::Linear(low, high)), panel))
+            (high > low)
+                .then(|| Chart::with_three_panels(caption, (name, Axis::Linear(low, high)), panel))
         };
         (QUANTITIES.iter().chain(&TEMPERATURES))
             .filter_map(chart)
             .collect()
     }
 
-    /// Amplitude spectral density of the errors beside that of white noise (m, m, rad); `None` where no
+    /// Amplitude spectral density of the errors beside the density of white noise (m, m, rad); `None` where no
     /// movement is long enough.
     pub(super) fn spectrum(&self, errors: &RowErrors, noise: [f64; 3]) -> Option<Chart> {
         let Density { bin_hz, power } = Density::new(self.dataset, self.period_s, errors)?;
@@ -164,10 +164,10 @@ impl Log<'_> {
             let bins = bins.map(|(bin, &power)| (bin as f64 * bin_hz, power * 1e12));
             let data = Mark::Line(Tone::Data, thinned(bins));
             let marks = vec![Mark::Line(Tone::Noise, white), data];
-            Panel::new(&format!("{}/rtHz", PLANAR[axis]), Scale::Logarithmic, marks)
+            Panel::new(&format!("{}/√Hz", PLANAR[axis]), Scale::Logarithmic, marks)
         };
-        Some(Chart::of_three(
-            "Amplitude spectral density of the errors, and that of white noise",
+        Some(Chart::with_three_panels(
+            "Amplitude spectral density of the errors and of white noise",
             ("frequency, Hz", Axis::Logarithmic(bin_hz, highest_hz)),
             panel,
         ))
@@ -177,7 +177,7 @@ impl Log<'_> {
 /// Power spectral density of errors, mean over windows of equal length within the movements.
 #[derive(Clone, Debug)]
 pub struct Density {
-    /// Distance of the bins, the first of which is at 0, Hz.
+    /// Distance of the bins from 0 on, Hz.
     pub bin_hz: f64,
     /// One-sided, of X, Y, Rz: m²/Hz, m²/Hz, rad²/Hz.
     pub power: [Vec<f64>; 3],

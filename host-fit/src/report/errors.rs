@@ -47,14 +47,14 @@ pub fn from_rms_and_peak(rms: [f64; 3], peak: [f64; 3]) -> Group {
             f64::NAN
         }
     };
-    by_axis(|k| {
+    per_axis(|k| {
         let (rms, peak) = (known(rms[k]), known(peak[k]));
         group! { "rmse" => micro(&PLANAR[k], rms), "peak" => micro(&PLANAR[k], peak) }
     })
 }
 
 /// What `item` gives for X, Y and Rz.
-pub fn by_axis<T: Into<Item>>(item: impl Fn(usize) -> T) -> Group {
+pub fn per_axis<T: Into<Item>>(item: impl Fn(usize) -> T) -> Group {
     Group(
         (0..3)
             .map(|k| (PLANAR[k].key.to_owned(), item(k).into()))
@@ -64,7 +64,7 @@ pub fn by_axis<T: Into<Item>>(item: impl Fn(usize) -> T) -> Group {
 
 /// X, Y, Rz in SI as figures.
 pub fn pose(axes: [f64; 3]) -> Group {
-    by_axis(|k| micro(&PLANAR[k], axes[k]))
+    per_axis(|k| micro(&PLANAR[k], axes[k]))
 }
 
 /// rms and peak of X, Y (um) and Rz (urad).
@@ -86,7 +86,7 @@ pub fn error_table(
 }
 
 /// The errors of each log.
-pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Group> {
+pub(super) fn errors_per_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Group> {
     let logs = dataset.logs.iter().zip(&judgement.logs);
     logs.map(|(log, judged)| {
         group! { "path" => file(&log.path), "rows" => judged.rows, "errors" => errors(&judged.errors) }
@@ -95,7 +95,7 @@ pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Group> {
 }
 
 /// The errors of rows by whole degrees of mount and body; empty where the log has no temperatures.
-pub(super) fn by_temperature(dataset: &Dataset, by_row: &RowErrors) -> Vec<Group> {
+pub(super) fn errors_per_degree(dataset: &Dataset, by_row: &RowErrors) -> Vec<Group> {
     let mut degrees: BTreeMap<(usize, i32), ErrorSums> = BTreeMap::new();
     for (index, (row, error)) in dataset.rows.iter().zip(by_row).enumerate() {
         for (sensor, read_mc) in row.frame.temperature_mc().into_iter().enumerate() {

@@ -57,7 +57,7 @@ fn predictions(fit: &FieldFigures, posterior: &Posterior) -> Vec<Group> {
         let vertical = [0, 1, 2].map(|k| side(3 + k) * fit.vertical_range[k]);
         Some(diagonal(&posterior.at_pose(planar, vertical)?))
     });
-    // Axis by axis: the worst corner of X need not be that of Y.
+    // Axis by axis: X and Y may have different worst corners.
     let worst = corners.reduce(|(a, b), (c, d)| {
         let larger = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k].max(b[k]));
         (larger(a, c), larger(b, d))

@@ -56,7 +56,7 @@ impl Unit {
     }
 }
 
-/// A figure whose key ends with its unit.
+/// A figure with its unit at the end of its key.
 pub fn figure(value: f64, unit: &'static str) -> Figure {
     let (unit, error) = (
         Unit {
@@ -68,7 +68,7 @@ pub fn figure(value: f64, unit: &'static str) -> Figure {
     Figure::Number { value, unit, error }
 }
 
-/// A figure whose key does not name its unit.
+/// A figure with a key that does not name its unit.
 pub fn bare(value: f64, unit: &'static str) -> Figure {
     let (unit, error) = (
         Unit {
@@ -103,12 +103,21 @@ impl Figure {
         }
     }
 
-    /// Its unit; of a list that of the first.
+    /// Its unit; a list has the unit of its first figure.
     pub fn unit(&self) -> Unit {
         match self {
             Self::Number { unit, .. } => *unit,
             Self::List(all) => all.first().map(Self::unit).unwrap_or_default(),
             _ => Unit::default(),
+        }
+    }
+
+    /// Whether it holds a text, or a yes or no.
+    pub(super) fn is_text(&self) -> bool {
+        match self {
+            Self::Text(_) | Self::Is(_) => true,
+            Self::List(all) => all.iter().any(Self::is_text),
+            _ => false,
         }
     }
 
@@ -168,7 +177,7 @@ impl Group {
             .any(|(_, item)| matches!(item, Item::Group(_)))
     }
 
-    /// Its figures and those of the groups in it, which carry the name of their group before theirs.
+    /// Its figures and the figures of the groups in it, these with the name of their group before their own.
     pub(super) fn flat(&self) -> Vec<(String, Figure)> {
         let one = |(name, item): &(String, Item)| match item {
             Item::Figure(figure) => vec![(words(name), figure.readable(false))],

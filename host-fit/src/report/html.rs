@@ -17,7 +17,7 @@ pub struct Page<'a> {
     pub title: &'static str,
     /// Whether a calibration can be used.
     pub verdict: Summary,
-    /// Name and text of what else a certificate says.
+    /// Name and text of the other facts on a certificate.
     pub facts: Vec<[String; 2]>,
     /// What was found.
     pub causes: Vec<Cause<'a>>,
@@ -77,7 +77,7 @@ pub struct Section {
     pub charts: Vec<Chart>,
 }
 
-/// Renders a template that may include those of verdict, findings and cells.
+/// Renders a template; it may include the templates of verdict, findings and cells.
 fn rendered(name: &str, template: &str, of: &impl Serialize) -> Result<String, Error> {
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);

@@ -99,7 +99,7 @@ impl Source<'_> {
         page.html()
     }
 
-    /// What a certificate says besides the verdict: who, when, of what, and what it is valid for.
+    /// The facts of a certificate besides the verdict: operator, date, stage, range of validity.
     fn facts(&self) -> Vec<[String; 2]> {
         let mut facts = self.facts.clone();
         let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);
@@ -112,7 +112,7 @@ impl Source<'_> {
             let mut ranges: Vec<String> = AXES.iter().zip(ends).map(range).collect();
             ranges.push(match set.model {
                 ModelKind::Field => "all axes moving".to_owned(),
-                _ => "movements like those of the log".to_owned(),
+                _ => "movements like the log".to_owned(),
             });
             add("valid for", ranges.join(", "));
             add("model", Model::from_kind(set.model).title());
@@ -136,7 +136,7 @@ impl Source<'_> {
         facts
     }
 
-    /// Temperatures of the log, and how far from that of calibration the errors hold.
+    /// Temperatures of the log, and the range of temperature in which the errors hold.
     fn temperature(&self) -> String {
         let all = 0..self.dataset.rows.len();
         let range = |sensor: usize| {
@@ -153,7 +153,7 @@ impl Source<'_> {
         }
         if let Some(Validity { within_k, .. }) = self.subject.diagnosis.validity {
             parts.push(format!(
-                "errors hold within {within_k:.1} K of that of calibration"
+                "errors hold within {within_k:.1} K of the temperature of calibration"
             ));
         }
         parts.join("; ")

@@ -99,7 +99,7 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         "Limited</b>",
         "uncertainty, k = 2",
         "X ±",
-        "movements like those of the log",
+        "movements like the log",
         "on one scale",
         "Errors against Rz",
         "Errors against signal C",

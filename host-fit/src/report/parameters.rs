@@ -36,7 +36,7 @@ pub fn coordinates(places_m: [[f64; 2]; 3]) -> Group {
     let m = |x: f64| figure(x, "m");
     group! {
         "h1x" => m(h1x), "h1y" => m(h1y), "h2x" => m(h2x), "h2y" => m(h2y), "h3x" => m(h3x), "h3y" => m(h3y),
-        "note" => "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
+        "note" => "smallest change from the designed values that gives the lever arms; data cannot separate the two coordinates of a probe",
     }
 }
 
@@ -104,7 +104,7 @@ pub fn temperature_parameters_in(set: &ParameterSet) -> BTreeMap<String, Paramet
 
 /// A table with a row for each term, and with the given columns for each probe. `figures` gives them for a parameter by
 /// its name and unit. A term without figures is left out.
-pub fn by_probe<'c>(
+pub fn probe_table<'c>(
     title: &str,
     terms: std::ops::Range<usize>,
     columns: &[&'c str],
@@ -135,7 +135,7 @@ pub fn tables(
 ) -> Vec<Table> {
     let titles = beside.iter().map(|(title, _)| *title);
     let columns: Vec<&str> = [""].into_iter().chain(titles).collect();
-    let of_31 = by_probe("parameters", 0..BEYOND_MODEL_31, &columns, |name, unit| {
+    let of_31 = probe_table("parameters", 0..BEYOND_MODEL_31, &columns, |name, unit| {
         let beside = beside.iter().map(|(_, values)| {
             let value = values.get(name);
             value.map_or(Figure::None, |x| bare(*x, unit))
@@ -143,7 +143,7 @@ pub fn tables(
         let own = Figure::from(*parameters.get(name)?);
         Some(std::iter::once(own).chain(beside).collect())
     });
-    let beyond = by_probe(
+    let beyond = probe_table(
         "field terms",
         BEYOND_MODEL_31..PER_PROBE,
         &[""],

@@ -1,8 +1,8 @@
 //! A planned run: its figures, and its tables.
 
-use super::errors::by_axis;
+use super::errors::per_axis;
 use super::figure::{Figure, Group, bare, figure, group, micro};
-use super::parameters::by_probe;
+use super::parameters::probe_table;
 use super::table::Table;
 use hallstage_calibration::plan::Plan;
 use hallstage_calibration::plan::temperature::WarmLog;
@@ -62,7 +62,7 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
         "taper" => figure(run.taper_s, "s"),
         "rows" => run.rows(stage.servo_period_s),
         "axes" => json!((0..6).map(axis).collect::<Vec<_>>()),
-        "service" => by_axis(predicted),
+        "service" => per_axis(predicted),
         "parameters" => Value::from((0..COUNT).map(parameter).collect::<Map<_, _>>()),
         "least_determined" => worst,
         "temperature" => json!(protocol.iter().map(warm_log).collect::<Vec<_>>()),
@@ -178,7 +178,7 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
     let standard_errors = plan.forecast.posterior.standard_errors();
     let index = |parameter: &str| (0..COUNT).find(|k| name(*k) == parameter);
     let title = "standard errors predicted";
-    let errors = by_probe(title, 0..PER_PROBE, &["", "of prior"], |name, unit| {
+    let errors = probe_table(title, 0..PER_PROBE, &["", "of prior"], |name, unit| {
         let k = index(name)?;
         let of_prior = over_prior(&standard_errors, k);
         let of_prior = of_prior.map_or(Figure::None, |x| rounded(x, 2).into());

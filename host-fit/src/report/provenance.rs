@@ -1,4 +1,4 @@
-//! Where the figures of a report come from: command, versions, inputs, seed.
+//! The origin of the figures of a report: command, versions, inputs.
 
 use super::table::Table;
 use super::text::file_name;
@@ -8,8 +8,7 @@ use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::path::Path;
 
-/// What somebody needs to make the same calibration again: a table of name, what it is, and for files
-/// their SHA-256.
+/// Everything that is needed to repeat the calibration: name, description, and SHA-256 of each file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance(pub Table);
 

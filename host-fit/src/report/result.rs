@@ -1,6 +1,6 @@
 //! The report of a fit, or of a blob that was judged: made once, shown as JSON, as tables and as a page.
 
-use super::errors::{RowErrors, by_log, by_temperature, errors};
+use super::errors::{RowErrors, errors, errors_per_degree, errors_per_log};
 use super::field;
 use super::figure::{Group, Item, bare, figure, group};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
@@ -22,7 +22,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// How well a blob describes logs, and what a fit says besides.
+/// How well a blob describes logs, and the results of the fit.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The blob.
@@ -140,7 +140,7 @@ impl Report {
     /// | `zero_deviations` | of each movement that was judged |
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
-    /// | `trusted_inputs` | the inputs whose errors no log shows, with the cost of 1 % |
+    /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
     pub fn from_judgement(judged: Judged, c: &Circumstances) -> Self {
         let Judged {
             set,
@@ -175,9 +175,9 @@ impl Report {
             "verdict" => json!(c.diagnosis.verdict),
             "predicted" => json!(c.diagnosis.predicted),
             "valid_within_k" => json!(c.diagnosis.validity.map(|validity| validity.within_k)),
-            "temperatures" => several(by_temperature(c.dataset, by_row)),
+            "temperatures" => several(errors_per_degree(c.dataset, by_row)),
             "findings" => json!(words::worded(&c.diagnosis.findings)),
-            "logs" => several(by_log(c.dataset, judgement)),
+            "logs" => several(errors_per_log(c.dataset, judgement)),
             "trusted_inputs" => trusted(set),
         };
         FIT_ONLY

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 pub struct Table {
     /// Its title.
     pub title: String,
-    /// Titles of the columns, that of the names first. None in a list of names with their figures.
+    /// Titles of the columns, beginning with the column of names. Empty in a list of names with their figures.
     pub columns: Vec<String>,
     /// Name and figures of each row.
     pub rows: Vec<(String, Vec<Figure>)>,
@@ -30,7 +30,7 @@ pub(super) struct Cells {
 }
 
 impl Table {
-    /// A table with these columns after that of the names.
+    /// A table with these columns after the column of names.
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
         let columns = [""].iter().chain(columns);
         Self {
@@ -136,8 +136,7 @@ impl Table {
             _ => title.clone(),
         };
         let mut titles: Vec<String> = self.columns.iter().enumerate().map(titled).collect();
-        let is_text =
-            |k: usize| column(k).any(|figure| matches!(figure, Figure::Text(_) | Figure::Is(_)));
+        let is_text = |k: usize| column(k).any(Figure::is_text);
         let mut is_left: Vec<bool> = std::iter::once(true)
             .chain((1..titles.len()).map(|k| is_text(k - 1)))
             .collect();

@@ -105,8 +105,8 @@ pub(super) fn words(key: &str) -> String {
     key.replace('_', " ")
 }
 
-/// Text with its control characters escaped, those of `kept` excepted, and the characters that reorder their
-/// neighbours. So a name, a cell or a serial number from a file shows as it is and forges no line.
+/// Text with escaped control characters, except the characters of `kept`. Characters that reorder their neighbours are
+/// escaped, too. So a name, a cell or a serial number from a file cannot forge a line.
 pub fn plain<'t>(text: &'t str, kept: &str) -> Cow<'t, str> {
     let harmful = |c: char| {
         let moves = c.is_control()

@@ -1,4 +1,4 @@
-//! The trusted inputs: an error in one of them leaves the residuals of a fit as they are, so no log shows it.
+//! The trusted inputs: an error in one of them does not change the residuals of a fit, so no log shows it.
 //!
 //! The fit turns the Hall signals into the pose of the reference. A wrong scale of the reference becomes a wrong scale of
 //! the pose. Fitted parameters absorb wrong scales and places of the sensors: eta the scale of the Hall codes, the lever
@@ -12,7 +12,7 @@ use serde_json::json;
 /// The relative error of an input.
 const PART: f64 = 0.01;
 
-/// The inputs: what each is, where the user gives it, and the axes that it scales.
+/// The inputs: name, where the user gives it, and the axes that it scales.
 const INPUTS: [(&str, &str, &[usize]); 4] = [
     (
         "scale of the interferometers",

@@ -133,7 +133,7 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
                 false => format!("{high:.1}"),
             };
             format!(
-                "for movements like those of the log; in service expect {} µm in X, {} µm in Y, {} µrad in Rz",
+                "for movements like the log; in service expect {} µm in X, {} µm in Y, {} µrad in Rz",
                 range(x),
                 range(y),
                 range(rz)

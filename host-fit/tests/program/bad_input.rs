@@ -1,13 +1,13 @@
 //! Bad input: an exit status, a message that says where and what to do, and nothing written.
 
-use crate::common::{Bench, changed, log, rows, stderr, thinned_log, with_cell};
+use crate::common::{Bench, changed, log, rows, thinned_log, with_cell};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
 
 const FIT: &str = "fit log.csv --out p.bin --json p.json --report report";
 
-/// What is wrong with each kind of file its reader tells, whose tests are its own.
+/// The readers have their own tests of each fault.
 #[test]
 fn what_cannot_be_read_is_named_with_its_place_and_nothing_is_written() {
     let log = log();
@@ -119,19 +119,6 @@ fn a_log_that_cannot_identify_the_model_ends_with_status_4_and_no_blob() {
     bench.good("fit height.csv --out p.bin --model 30");
 }
 
-/// 40 ms apart, samples of a movement differ by a tenth of it.
-#[test]
-fn a_coarsely_sampled_log_of_one_long_movement_moves() {
-    let bench = Bench::new();
-    let joined = changed(&log(), |row, cells| {
-        (cells[0], cells[1]) = (0, 2000 * row as i64);
-    });
-    bench.write("long.csv", joined);
-    // The interferometers were reset within it, which is what the log is refused for.
-    let said = stderr(&bench.run("fit long.csv --out p.bin"));
-    assert!(!said.contains("does not move"), "{said}");
-}
-
 #[test]
 fn wrong_usage_ends_with_status_2() {
     let bench = Bench::with_log();
@@ -146,13 +133,6 @@ fn wrong_usage_ends_with_status_2() {
         "fit log.csv --out p.bin --seed -1",
         "fit log.csv --out p.bin --threads 0",
         "decode p.bin --out pose.csv",
-        "fit log.csv --out log.csv",
-        "fit log.csv --out ./stage.toml",
-        "fit log.csv --out p.bin --json p.bin",
-        "inspect log.csv --json log.csv",
-        "import bus.log log.csv --out log.csv",
-        "import log.csv ifm.csv --out ./log.csv",
-        "live --can no-such-bus log.csv --record log.csv",
         "import bus.log log.csv --out x.csv --search-s=nan",
         "import bus.log log.csv --out x.csv --search-s=3601",
     ] {

@@ -1,4 +1,4 @@
-//! Runs the program in a folder of its own, on logs made from the one that ships with it.
+//! Runs the program in a folder of its own, on logs made from the shipped log.
 
 use serde_json::Value;
 use std::f64::consts::TAU;
@@ -188,7 +188,7 @@ pub fn log() -> String {
     thinned_log(20, |_| true)
 }
 
-/// A run of so many cycles of each axis over the range of service; an axis of none stands still.
+/// A run with this number of cycles of each axis over the range of service. An axis with no cycles stands still.
 pub fn plan(seconds: f64, cycles: [f64; 6]) -> String {
     const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
     let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();

@@ -35,7 +35,7 @@ fn changed(log: &str, columns: &[&str], change: impl Fn(i64, i64) -> i64) -> Str
 
 const BEAMS: [&str; 3] = ["ifm_x_nm", "ifm_y1_nm", "ifm_y2_nm"];
 
-/// Also where the fit of a model ends with a blob at hand, and with figures if they are asked for.
+/// Also where the fit of a model gives a blob, and figures if they are asked for.
 #[test]
 fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
     let bench = Bench::new();

@@ -1,4 +1,4 @@
-//! A command that is killed at any time, or whose disk is full, leaves each of its outputs old or new and whole.
+//! Each output of a command is old, or new and whole, after a kill at any time and on a full disk.
 //!
 //! ```sh
 //! KILLS=1000 cargo test -p host-fit --test program -- killed --nocapture

@@ -68,7 +68,7 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
     says(&shown, "11 columns mapped, left out: temperature");
     let fit = "fit log.csv --stage new.toml --out p.bin";
     bench.bad(fit, 3, &["new.toml", "`: missing; fill in the"]);
-    // The examples are those of the stage that made the log.
+    // The examples are of the stage that made the log.
     let text = bench.text("new.toml");
     assert!(text.contains(MARK));
     bench.write(

@@ -1,6 +1,6 @@
 //! Fits that succeed, with something that the user must know.
 
-use crate::common::{Bench, number, says, stderr, thinned_log};
+use crate::common::{Bench, number, says, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
 
 #[test]
@@ -61,33 +61,4 @@ fn movements_of_several_logs_are_distinguished() {
     let json = bench.figures("fit a.csv b.csv --out p.bin");
     assert_eq!(json["zero_deviations"][0]["movement"], "a.csv:0");
     assert_eq!(json["zero_deviations"][30]["movement"], "b.csv:0");
-}
-
-/// A user of the system may have no more processes than there are; the superuser always may.
-#[cfg(unix)]
-#[test]
-fn a_fit_goes_on_where_the_system_starts_no_threads() {
-    use std::os::unix::fs::{MetadataExt, PermissionsExt};
-    use std::os::unix::process::CommandExt;
-    let bench = Bench::with_log();
-    let fit = "exec ./host-fit fit log.csv --json p.json --out";
-    std::fs::copy(env!("CARGO_BIN_EXE_host-fit"), bench.path("host-fit")).expect("copied");
-    let folder = bench.path("");
-    let everyone = std::fs::Permissions::from_mode(0o777);
-    std::fs::set_permissions(&folder, everyone).expect("ours");
-    let shell = |line: &str| {
-        let mut shell = std::process::Command::new("sh");
-        shell.args(["-c", line]).current_dir(&folder);
-        if std::fs::metadata(&folder).expect("there").uid() == 0 {
-            shell.uid(65_534);
-        }
-        shell.output().expect("a shell")
-    };
-    // Shells differ in the letter of this limit.
-    let alone = "{ ulimit -u 1 2>&- || ulimit -p 1; } && ";
-    for (limit, out) in [("", "many.bin"), (alone, "one.bin")] {
-        let output = shell(&format!("{limit} {fit} {out}"));
-        assert!(output.status.success(), "{}", stderr(&output));
-    }
-    assert!(bench.read("many.bin") == bench.read("one.bin"));
 }

@@ -7,7 +7,7 @@ use host_fit::output::blob_file;
 fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
     let bench = Bench::with_log();
     bench.bad("fit log.csv --out no/such/p.bin", 3, &["no/such"]);
-    // None of the outputs is written when one of them cannot be.
+    // All outputs are written, or none.
     bench.write("file", "");
     for output in ["--json no/such/p.json", "--report file"] {
         let arguments = format!("fit log.csv --out p.bin {output}");

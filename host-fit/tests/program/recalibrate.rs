@@ -1,9 +1,9 @@
-//! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
+//! An old calibration brought up to date, on a stage made of physics. Its codes are scaled as
 //! changed gains scale them.
 
 use crate::common::{Bench, changed, number, plan, says, stderr, stdout};
 
-/// A log whose probes A, B, C read `gains` times as much.
+/// A log with probes A, B, C that read `gains` times as much.
 fn with_gains(log: &str, gains: [f64; 3]) -> String {
     changed(log, |_, cells| {
         for (code, gain) in cells[HALL_A..].iter_mut().zip(gains) {
@@ -197,6 +197,6 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         "diff old.bin old.bin --json old.bin.posterior",
         "decode old.bin short.csv --uncertainty --out old.bin.posterior",
     ] {
-        bench.bad(command, 2, &["old.bin.posterior is an input"]);
+        bench.bad(command, 2, &["old.bin.posterior: also an input"]);
     }
 }

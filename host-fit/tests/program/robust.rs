@@ -98,35 +98,6 @@ fn one_row_in_a_hundred_off_by_50_um_costs_nothing_in_service() {
 }
 
 #[test]
-fn model_31_forgets_a_stuck_movement_and_jumps() {
-    let bench = Bench::new();
-    let log = log();
-    bench.write("clean.csv", &log);
-    // The reference stands still in a movement.
-    let stuck = changed(&log, |_, row| {
-        if row[0] == 28 {
-            row[2..5].fill(0);
-        }
-    });
-    bench.write("stuck.csv", stuck);
-    bench.write("jumps.csv", with_jumps(&log));
-    bench.good("fit clean.csv --out clean.bin --model 31");
-    for log in ["stuck", "jumps"] {
-        for (loss, limit) in [("cauchy", 1.005), ("huber", 1.05)] {
-            let fit = format!("fit {log}.csv --out {log}.bin --model 31 --loss {loss}");
-            bench.good(&fit);
-            assert_as_good(
-                &bench,
-                &format!("{log}.bin"),
-                "clean.bin",
-                "clean.csv",
-                limit,
-            );
-        }
-    }
-}
-
-#[test]
 fn a_log_of_which_a_tenth_is_wrong_is_refused_with_the_place() {
     let bench = Bench::new();
     let inverted = changed(&thinned_log(10, |_| true), |_, row| {

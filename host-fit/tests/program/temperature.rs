@@ -1,4 +1,4 @@
-//! A simulated stage that warms at work: fitted cold, brought up to date warm, judged over the day.
+//! A simulated stage that warms in service: fitted cold, brought up to date warm, judged over the day.
 
 use crate::common::{Bench, number, plan, says, stderr, stdout};
 

@@ -19,6 +19,8 @@ fn quiet_tells_errors_only() {
     let output = bench.good(fit);
     assert!(stdout(&output).contains("wrote p.bin"));
     assert!(stderr(&output).contains("note: "));
+    // No colour where there is no terminal.
+    assert!(!(stdout(&output) + &stderr(&output)).contains('\u{1b}'));
     let quiet = bench.good(&format!("{fit} --quiet"));
     assert_eq!((stdout(&quiet), stderr(&quiet)), Default::default());
     bench.bad("-q inspect absent.bin", 3, &["absent.bin"]);
@@ -57,13 +59,6 @@ fn a_blob_is_read_from_standard_input() {
     bench.good("fit log.csv --out p.bin --serial HS-1");
     let output = bench.piped("inspect -", &bench.read("p.bin"));
     assert!(stdout(&output).contains("HS-1"));
-}
-
-#[test]
-fn nothing_is_coloured_or_drawn_where_there_is_no_terminal() {
-    let bench = bench();
-    let output = bench.good("fit log.csv --out p.bin --project none");
-    assert!(!(stdout(&output) + &stderr(&output)).contains('\u{1b}'));
 }
 
 #[test]

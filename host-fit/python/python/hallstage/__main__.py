@@ -1,4 +1,4 @@
-"""The program `host-fit`, as it is without Python."""
+"""The program `host-fit`."""
 
 import signal
 import sys

@@ -26,7 +26,7 @@ def plain(value: Any) -> Any:
 
 
 class OptimizeResult(NamedTuple):
-    """What a search found; its fields are those of SciPy. Made by `minimize`."""
+    """The result of a search, with the fields of SciPy. Made by `minimize`."""
 
     #: Why the search ended.
     message: str
@@ -98,7 +98,7 @@ class Parameter(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The ends of the interval that covers 95 %: value -+ 1.96 std; None without a standard error."""
+        """The ends of the interval that covers 95 %: value -+ 1.96 std, or None without a standard error."""
         if self.std is None:
             return None
         half = _COVERS_95 * self.std

@@ -53,7 +53,7 @@ fn the_slots_are_those_of_the_memory_map() {
     ));
 }
 
-/// In a file for one slot, and in that for both, where the blob is at the start of each.
+/// In a file for one slot, and in a file for both, with the blob at the start of each.
 #[test]
 fn each_format_read_back_from_padded_flash_is_the_same_set() {
     for slots in [&SLOTS[..1], &SLOTS[1..], &SLOTS] {

@@ -60,8 +60,8 @@ impl DecodeSettings<'_> {
 /// and what is odd about the log.
 ///
 /// # Errors
-/// Those of the log, when the rows above its first fault are done, and those of the output,
-/// which then is as it was before. A pipe keeps what was written to it.
+/// Errors of the log, after the rows above its first fault, and those of the output,
+/// which then has not changed. A pipe keeps what was written to it.
 pub fn decode_log<E: From<LogError> + From<OutputError>>(
     log: &Path,
     stage: &Stage,

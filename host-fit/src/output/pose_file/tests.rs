@@ -205,7 +205,7 @@ fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
     }
 }
 
-/// Finite words: any of them, and those of a stage's range more often.
+/// Finite words, most of them within the range of a stage.
 fn word() -> impl Strategy<Value = u32> {
     let any = any::<u32>().prop_filter("finite", |bits| f32::from_bits(*bits).is_finite());
     prop_oneof![any, (-1e-3f32..1e-3).prop_map(f32::to_bits)]

@@ -5,7 +5,7 @@ use super::{HEADER, PoseRow};
 /// What uncertainties add to the first line.
 const UNCERTAINTIES: &str = ",u_x_um,u_y_um,u_rz_urad";
 
-/// Exponents of the first digit for which [`number`] has powers of ten.
+/// Exponents of the first digit within the table of powers.
 const EXPONENTS: std::ops::Range<i32> = -12..9;
 
 /// Powers of ten from 1e-12 to 1e20; from 1 on they are exact.
@@ -51,9 +51,8 @@ fn integer(bytes: &mut Vec<u8>, value: impl itoa::Integer) {
     bytes.extend_from_slice(itoa::Buffer::new().format(value).as_bytes());
 }
 
-/// A number that is not negative, in nine significant digits: they tell any two `f32` apart, and leave a
-/// margin of six for the rounding of the scale in `f64`. Positional while that is short; zeros at the end
-/// are dropped.
+/// A number of zero or more in nine significant digits. Nine digits distinguish any two `f32`, with a margin of six for
+/// the rounding of the scale in `f64`. Positional while that is short, without zeros at the end.
 fn number(bytes: &mut Vec<u8>, value: f64) {
     if value == 0.0 {
         return bytes.push(b'0');
