@@ -54,9 +54,9 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
     Group(names.into_iter().map(change).collect())
 }
 
-/// The second blob's pose less the first one's, by the decoder of the target, over codes at which the first blob reads a grid of
-/// poses. The grid covers the range of calibration that both blobs share. `refused` counts poses that either blob does not
-/// decode. `None` where the geometry of the first blob cannot be inverted.
+/// The difference between the poses of two blobs, second less first, by the decoder of the target. The codes cover a grid of
+/// poses of the first blob, over the range of calibration that both blobs share. `refused` counts poses that either blob
+/// does not decode. `None` where the geometry of the first blob cannot be inverted.
 pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
     let range_of = |set: &ParameterSet| {
         let c = &set.constants;

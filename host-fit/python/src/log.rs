@@ -14,7 +14,6 @@ use host_fit::input::log::{
 use host_fit::input::stage::{Stage as Designed, TemperatureTable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use runtime::frame::MISSING_CODE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -260,40 +259,23 @@ impl Log {
     /// The rows as a `pandas.DataFrame`: number of the log, movement, time, codes, poses, temperatures, in SI
     /// units but for `t_us` and degC. Needs pandas.
     #[getter]
-    fn df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let pandas = py.import("pandas")?;
-        let columns = PyDict::new(py);
-        let log_of = |row: &Row| self.reading.dataset.movements[row.movement].log;
-        let logs = self.rows().iter().map(|row| log_of(row) as i64);
-        columns.set_item("log", PyArray1::from_iter(py, logs))?;
-        columns.set_item("movement", self.movement(py))?;
-        columns.set_item("t_us", self.t_us(py))?;
-        let three = |names: [&str; 3], array: &Bound<'py, PyAny>| -> PyResult<()> {
-            let across = array.getattr("T")?;
-            for (k, name) in names.iter().enumerate() {
-                columns.set_item(name, across.get_item(k)?)?;
-            }
-            Ok(())
-        };
-        three(["hall_a", "hall_b", "hall_c"], self.hall(py)?.as_any())?;
-        if let Some(caps) = self.caps(py)? {
-            three(["cap_1", "cap_2", "cap_3"], caps.as_any())?;
-        }
-        three(["z_m", "rx_rad", "ry_rad"], self.vertical(py)?.as_any())?;
-        if self.has_reference() {
-            three(["x_m", "y_m", "rz_rad"], self.reference(py)?.as_any())?;
-        }
-        for (sensor, name) in [MOUNT, BODY].into_iter().enumerate() {
-            if self
-                .reading
+    fn df<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let movements = &this.reading.dataset.movements;
+        let logs = this
+            .rows()
+            .iter()
+            .map(|row| movements[row.movement].log as i64);
+        let logs = PyArray1::from_iter(py, logs);
+        let has_temperatures = [0, 1].map(|sensor| {
+            let all = 0..this.rows().len();
+            this.reading
                 .dataset
-                .temperature_range_mc(sensor, 0..self.rows().len())
+                .temperature_range_mc(sensor, all)
                 .is_some()
-            {
-                columns.set_item(name, self.temperature(py, sensor))?;
-            }
-        }
-        pandas.call_method1("DataFrame", (columns,))
+        });
+        let frame = py.import("hallstage._results")?.getattr("frame")?;
+        frame.call1((slf, logs, this.has_reference(), has_temperatures))
     }
 
     fn __repr__(&self) -> String {

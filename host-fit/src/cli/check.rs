@@ -34,7 +34,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let started = Instant::now();
     super::check_outputs(
         [args.json.path.as_deref()],
-        &args.report,
+        Some(&args.report),
         args.logs.inputs(),
     )?;
     interrupt::watch();

@@ -3,7 +3,6 @@
 use super::args::StageFile;
 use super::arguments::{choice, hold};
 use super::interrupt;
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Output;
@@ -47,7 +46,7 @@ pub(super) struct DecodeArgs {
 /// Decodes a log into a pose file.
 pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let inputs = [&args.params, &args.log, &args.stage.path].map(PathBuf::as_path);
-    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
+    super::check_outputs([Some(args.out.as_path())], None, inputs)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.stage)?;
     let known = || posterior(&set, &stage, &args.params);
     let posterior = args.uncertainty.then(known).transpose()?;

@@ -2,7 +2,6 @@
 
 use super::args::Json;
 use super::inspect::errors;
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diff::{parameter_changes, pose_difference};
@@ -32,7 +31,7 @@ pub(super) struct DiffArgs {
 /// Shows what changed between two blobs.
 pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     let paths = [args.a.as_path(), args.b.as_path()];
-    super::check_outputs([args.json.path.as_deref()], &Report::default(), paths)?;
+    super::check_outputs([args.json.path.as_deref()], None, paths)?;
     let [a, b] = [blob_file::read(paths[0])?, blob_file::read(paths[1])?];
     let errors = [
         standard_errors(&a, paths[0])?,

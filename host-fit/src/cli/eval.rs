@@ -46,7 +46,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let inputs = [args.params.as_path()]
         .into_iter()
         .chain(args.logs.inputs());
-    super::check_outputs([args.json.path.as_deref()], &args.report, inputs)?;
+    super::check_outputs([args.json.path.as_deref()], Some(&args.report), inputs)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     let options = args.logs.options(Evaluation::OPTIONS);
     let paths = &args.logs.paths;

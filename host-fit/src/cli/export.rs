@@ -1,7 +1,6 @@
 //! `host-fit export`.
 
 use super::arguments::choice;
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
@@ -65,11 +64,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
         .to_string_lossy();
     let name = format!("{stem}-{address:08x}.{}", args.format.extension());
     let out = (args.out.clone()).unwrap_or_else(|| args.params.with_file_name(name));
-    super::check_outputs(
-        [Some(out.as_path())],
-        &Report::default(),
-        [args.params.as_path()],
-    )?;
+    super::check_outputs([Some(out.as_path())], None, [args.params.as_path()])?;
     write_atomically(&out, &file)?;
     let places: Vec<_> = addresses.iter().map(|at| format!("{at:#010x}")).collect();
     terminal::print(&format!(

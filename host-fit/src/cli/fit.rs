@@ -92,7 +92,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     let inputs = args.logs.inputs().chain(args.start.as_deref());
-    super::check_outputs(outputs, &args.report, inputs)?;
+    super::check_outputs(outputs, Some(&args.report), inputs)?;
     let loss = choose_loss(args.loss, args.model, args.solver, args.project);
     let loss = loss.map_err(HostError::from_mismatch)?;
     interrupt::watch();

@@ -2,7 +2,6 @@
 
 use super::args::Json;
 use super::interrupt;
-use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update::{self, Identity};
 use crate::cli::error::HostError;
@@ -25,7 +24,7 @@ pub(super) struct IdentifyArgs {
 
 /// Asks a controller for its identity and its parameters.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
-    super::check_outputs([args.json.path.as_deref()], &Report::default(), [])?;
+    super::check_outputs([args.json.path.as_deref()], None, [])?;
     let figures = figures(&update::identify(&args.can, interrupt::watch())?);
     args.json.write(&figures)?;
     terminal::print(&as_text(&figures.tables()))

@@ -2,7 +2,6 @@
 
 use super::arguments::{between, choice};
 use super::interrupt;
-use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::import::{self, ImportReport, ImportSettings};
 use crate::cli::error::HostError;
@@ -85,7 +84,7 @@ impl ImportArgs {
 /// Joins a record of the bus and a reference, and shows how it went.
 pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
     let inputs = [&args.bus, &args.reference, &args.stage].map(PathBuf::as_path);
-    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
+    super::check_outputs([Some(args.out.as_path())], None, inputs)?;
     let report = import::run(&args.settings())?;
     terminal::print(&as_text(&figures(&report).tables()))?;
     let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";

@@ -1,6 +1,5 @@
 //! `host-fit init`.
 
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{is_standard, write_atomically};
@@ -25,7 +24,7 @@ pub(super) struct InitArgs {
 /// Drafts a stage file for logs.
 pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
     let inputs = args.logs.iter().map(PathBuf::as_path);
-    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
+    super::check_outputs([Some(args.out.as_path())], None, inputs)?;
     if !is_standard(&args.out) && !args.force && args.out.exists() {
         let there = args.out.display();
         let problem =

@@ -1,7 +1,6 @@
 //! `host-fit inspect`.
 
 use super::args::Json;
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{blob_file, posterior_file};
@@ -31,11 +30,7 @@ pub(super) struct InspectArgs {
 
 /// Shows every field of a blob, and the faults that its calibration is without where its posterior tells.
 pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
-    super::check_outputs(
-        [args.json.path.as_deref()],
-        &Report::default(),
-        [args.params.as_path()],
-    )?;
+    super::check_outputs([args.json.path.as_deref()], None, [args.params.as_path()])?;
     let set = blob_file::read(&args.params)?;
     let posterior = posterior_file::beside(&args.params);
     let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());

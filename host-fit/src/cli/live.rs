@@ -2,7 +2,6 @@
 
 use super::arguments::{hold, seconds};
 use super::interrupt;
-use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::live::{self, LiveSettings};
 use crate::cli::error::HostError;
@@ -76,10 +75,6 @@ impl LiveArgs {
 
 /// Decodes a bus.
 pub(super) fn run(args: &LiveArgs) -> Result<(), HostError> {
-    super::check_outputs(
-        [args.record.as_deref()],
-        &Report::default(),
-        [args.params.as_path()],
-    )?;
+    super::check_outputs([args.record.as_deref()], None, [args.params.as_path()])?;
     Ok(live::run(&args.settings(), interrupt::watch().stop)?)
 }

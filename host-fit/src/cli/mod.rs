@@ -198,7 +198,7 @@ fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
 /// goes to standard output, nothing else does from now on.
 fn check_outputs<'p>(
     outputs: impl IntoIterator<Item = Option<&'p Path>>,
-    report: &report::Report,
+    report: Option<&report::Report>,
     inputs: impl IntoIterator<Item = &'p Path>,
 ) -> Result<(), HostError> {
     let inputs: Vec<&Path> = inputs.into_iter().collect();
@@ -211,8 +211,11 @@ fn check_outputs<'p>(
         terminal::keep_for_output();
     }
     // A new folder holds only new files.
-    let new = report.folder.as_deref().filter(|folder| !folder.exists());
-    let page = report.page().filter(|_| new.is_none());
+    let folder = report.and_then(|report| report.folder.as_deref());
+    let new = folder.filter(|folder| !folder.exists());
+    let page = report
+        .and_then(report::Report::page)
+        .filter(|_| new.is_none());
     outputs.extend(page.as_deref());
     let beside: Vec<_> = (inputs.iter())
         .filter_map(|path| posterior_file::beside(path))

@@ -2,7 +2,6 @@
 
 use super::args::{Json, StageFile};
 use super::arguments::between;
-use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -42,7 +41,7 @@ pub(super) struct PlanArgs {
 /// Plans a run within the limits of [motion] in the stage file, and writes trajectory and JSON.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
-    super::check_outputs(outputs, &Report::default(), [args.stage.path.as_path()])?;
+    super::check_outputs(outputs, None, [args.stage.path.as_path()])?;
     let stage = args.stage.read()?;
     let (seconds, period_s) = (args.seconds.unwrap_or(COLD_S), stage.servo_period_s);
     if seconds / period_s > PERIODS_MAX {

@@ -2,7 +2,6 @@
 
 use super::identify;
 use super::interrupt;
-use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update;
 use crate::cli::error::HostError;
@@ -24,7 +23,7 @@ pub(super) struct ReadBackArgs {
 
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
-    super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
+    super::check_outputs([Some(args.out.as_path())], None, [])?;
     let (identity, blob) = update::read_back(&args.can, interrupt::watch())?;
     write_atomically(&args.out, &blob)?;
     let parameters = identify::parameters(&identity);

@@ -2,7 +2,7 @@
 
 use super::args::{Json, Logs};
 use super::arguments::choice;
-use super::report::{Report, finish};
+use super::report::finish;
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
@@ -49,11 +49,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         new_posterior.as_deref(),
         args.json.path.as_deref(),
     ];
-    super::check_outputs(
-        outputs,
-        &Report::default(),
-        inputs.chain(old_posterior.as_deref()),
-    )?;
+    super::check_outputs(outputs, None, inputs.chain(old_posterior.as_deref()))?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     if old.model != ModelKind::Field {
         let model = Model::from_kind(old.model).title();

@@ -3,7 +3,6 @@
 use super::arguments::seconds;
 use super::interrupt;
 use super::key::KeyFile;
-use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::recorder::{self, RecorderSettings};
 use crate::cli::error::HostError;
@@ -30,7 +29,7 @@ pub(super) struct RecordArgs {
 
 /// Records, and says what the record holds.
 pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
-    super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
+    super::check_outputs([Some(args.out.as_path())], None, [])?;
     let settings = RecorderSettings {
         address: args.can.clone(),
         out: args.out.clone(),

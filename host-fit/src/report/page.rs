@@ -136,7 +136,7 @@ impl Source<'_> {
         facts
     }
 
-    /// Temperatures of the log, and the range of temperature in which the errors hold.
+    /// Temperatures of the log, and how far from the temperature of calibration the errors hold.
     fn temperature(&self) -> String {
         let all = 0..self.dataset.rows.len();
         let range = |sensor: usize| {

@@ -143,8 +143,8 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
     }
 }
 
-/// rms over all rows, noise, what is predicted for service, expanded uncertainty, limit. The uncertainty is
-/// that in service if it is predicted, else that on the log; k = 2 covers 95 % of normal errors.
+/// By axis: rms over all rows, noise, rms predicted for service, expanded uncertainty, limit. The uncertainty is twice the
+/// rms in service, or on the log if service is not predicted; k = 2 covers 95 % of normal errors.
 fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
     if of.errors.is_none() && predicted.is_none() {
         return Table::default();

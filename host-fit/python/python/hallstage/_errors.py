@@ -31,8 +31,13 @@ class LogError(ValueError):
 
 
 class LogRefused(Exception):
-    """A log that is no good for a calibration; `findings` say what is wrong with it, the most severe first."""
+    """A log that is no good for a calibration.
+
+    `findings` say what is wrong with it, the most severe first. `code` is the code of the finding that refuses it,
+    None where the errors are beyond `limit`, or where a fit failed without such a finding.
+    """
 
     def __init__(self, message: str, findings: list[Finding]) -> None:
         super().__init__(message)
         self.findings = findings
+        self.code = next((found.code for found in findings if found.severity == "refuse"), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -183,3 +184,23 @@ class Residuals:
             panel.set_ylabel(f"{name}, {unit}".replace("u", "\N{MICRO SIGN}"))
         panels[-1].set_xlabel("row")
         return figure
+
+
+def frame(log: Any, logs: Any, has_reference: bool, has_temperatures: tuple[bool, bool]) -> Any:
+    """The rows of a log as a `pandas.DataFrame`."""
+    pandas = import_module("pandas")
+    columns: dict[str, Any] = {"log": logs, "movement": log.movement, "t_us": log.t_us}
+
+    def add(names: str, array: Any) -> None:
+        columns.update(zip(names.split(), array.T, strict=True))
+
+    add("hall_a hall_b hall_c", log.hall)
+    if log.caps is not None:
+        add("cap_1 cap_2 cap_3", log.caps)
+    add("z_m rx_rad ry_rad", log.vertical)
+    if has_reference:
+        add("x_m y_m rz_rad", log.reference)
+    for name, there in zip(("mount", "body"), has_temperatures, strict=True):
+        if there:
+            columns[f"{name}_c"] = getattr(log, name)
+    return pandas.DataFrame(columns)
