@@ -46,7 +46,7 @@ fn what_cannot_be_planned_leaves_no_file() {
         2,
         &["standard output: also another output"],
     );
-    bench.bad("plan --seconds 20 --out stage.toml", 2, &["is an input"]);
+    bench.bad("plan --seconds 20 --out stage.toml", 2, &["also an input"]);
     bench.write(
         "fast.toml",
         STAGE_TOML.replace("period_s = 0.002", "period_s = 1e-6"),
