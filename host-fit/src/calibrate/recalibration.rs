@@ -95,7 +95,7 @@ fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[St
         "predicted_service" => group! {
             "before" => rms(new.before), "after" => rms(new.after), "floor" => rms([1.0; 3]),
         },
-        // Whether there was an old posterior, and so is a new one.
+        // Whether there was an old posterior, and so a new posterior.
         "posterior" => new.known.is_some(),
         // Over residuals: about 1.
         "chi_squared" => new.chi_squared,

@@ -38,7 +38,7 @@ pub struct ErrorSums {
 }
 
 impl ErrorSums {
-    /// Of no row.
+    /// The sums over no rows.
     pub const NONE: Self = Self {
         rows: 0,
         undecoded: 0,

@@ -31,7 +31,7 @@ pub struct Alignment<'s> {
 /// A lag that is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lag {
-    /// Of the reference behind the probes at time zero of the rows, s.
+    /// Lag of the reference behind the probes at time zero of the rows, s.
     pub value_s: f64,
     /// What it grows by, s/s.
     pub rate: f64,

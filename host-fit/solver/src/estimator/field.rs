@@ -114,7 +114,7 @@ pub struct WhiteFit {
     noise: Noise,
     resets_mm: Option<[f64; 3]>,
     iterations: u32,
-    /// Of Model (31).
+    /// The parameters of Model (31).
     start: Parameters,
 }
 
@@ -168,7 +168,7 @@ impl WhiteFit {
         self.weights_by(loss).iter().any(|weight| *weight < 1.0)
     }
 
-    /// The same as [`WhiteFit::new`] with weights by a loss, from a start that bad rows don't bend.
+    /// The first phase with weights by a loss, from a start that bad rows do not bend.
     ///
     /// # Errors
     /// See [`FieldFitError`].

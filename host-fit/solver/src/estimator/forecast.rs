@@ -60,7 +60,7 @@ impl Forecaster {
         Some(Forecast { posterior, service })
     }
 
-    /// The same for logs at several temperatures, at distances (mount, body) from T0, K.
+    /// The forecast for logs at several temperatures, at distances (mount, body) from T0, K.
     pub fn forecast_temperatures(
         &self,
         rows: &Rows,

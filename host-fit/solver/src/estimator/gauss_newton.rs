@@ -42,7 +42,7 @@ pub struct Normal<const W: usize> {
 impl<const W: usize> Normal<W> {
     const RESIDUAL: usize = W - 1;
 
-    /// Of no rows.
+    /// The sums over no rows.
     pub fn none() -> Self {
         Self {
             products: vec![[0.0; W]; W],
@@ -258,7 +258,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Of a curvature, `damping` times its diagonal added; `None` where it is singular.
+    /// Factors a curvature plus `damping` times its diagonal; `None` where it is singular.
     pub fn new(curvature: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let scale = curvature.diagonal().map(|d| {
             let d = d.sqrt();

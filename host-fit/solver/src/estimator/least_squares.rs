@@ -12,7 +12,7 @@ use hallstage_input::stage::{Range, Stage};
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::time::Duration;
 
-/// Rows on which starts are compared. The fit to all rows goes on from the fit to these.
+/// Starts are compared on this number of rows. The fit to all rows goes on from the fit to these.
 const START_ROWS: usize = 2000;
 const LIMITS: Limits = Limits {
     steps: 100,

@@ -8,7 +8,8 @@
 //! | [`paper`] | the 18 parameters of Models (12) to (31), and their search ranges |
 //! | [`motion`] | the motions that show a parameter |
 //! | [`draw`] | the rows that a fit draws |
-//! | [`rows`] | rows, and their means over a few |
+//! | [`rows`] | the rows of a log |
+//! | [`blocks`] | residuals and derivatives of rows, as means over a few |
 //! | [`probe`] | what a probe reads, with derivatives |
 //! | [`gauss_newton`] | damped Gauss-Newton with a prior, for all models |
 //! | [`problem`] | stage, model and rows of a fit by the pose |
@@ -28,6 +29,7 @@
 //! | [`forecast`] | the posterior of a log that is not recorded yet |
 //! | [`clocks`] | two clocks, from the motion that both saw |
 
+pub mod blocks;
 pub mod clocks;
 pub mod draw;
 pub mod error;

@@ -1,7 +1,8 @@
 //! The noise of a log from the residuals of a fit: white at the probes, a walk of the reference.
 
+use super::blocks::Block;
 use super::probe::Probe;
-use super::rows::{Block, Rows};
+use super::rows::Rows;
 use super::terms::PER_PROBE;
 use super::whiten::{LAG, Noise, UNKNOWNS};
 use crate::estimator::robust::HALF;

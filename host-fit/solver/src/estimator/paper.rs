@@ -26,7 +26,7 @@ impl Parameters {
         Self::new(&stage.geometry(), [1.0; 3], [[0.0; 3]; 3])
     }
 
-    /// Of a geometry, eta and the slopes of A, B, C.
+    /// The parameters with this geometry, eta and slopes of A, B, C.
     pub fn new(geometry: &ProbeGeometry<f64>, eta: [f64; 3], slopes: [[f64; 3]; 3]) -> Self {
         let mut values = [0.0; COUNT];
         for probe in 0..3 {
@@ -49,7 +49,7 @@ impl Parameters {
         Self::new(geometry, sensitivity.map(|s| s.eta), slopes)
     }
 
-    /// Of values in the order of the list.
+    /// The parameters with these values, in the order of the list.
     pub fn from_slice(slice: &[f64]) -> Self {
         let mut values = [0.0; COUNT];
         for (value, x) in values.iter_mut().zip(slice) {

@@ -55,7 +55,7 @@ impl FieldParameters {
         }
     }
 
-    /// Of the values of A's, B's and C's parameters in a row.
+    /// The parameters with these values: those of A, then of B, then of C.
     pub fn from_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
@@ -75,7 +75,7 @@ impl FieldParameters {
         })
     }
 
-    /// The same without the drawing: the probes stand where the slopes of their sensitivities say, which the
+    /// The parameters in a blob, without the drawing: the probes stand where the slopes of their sensitivities say, which the
     /// drawing changes by a part in 2000.
     pub fn from_blob(set: &ParameterSet) -> Option<Self> {
         let probes = values_of(set)?;

@@ -51,7 +51,7 @@ struct Decoded {
 }
 
 impl Decoder {
-    /// Of the parameters; `None` where PM is singular or an eta is zero.
+    /// A decoder with these parameters; `None` where PM is singular or an eta is zero.
     pub fn new(parameters: &Parameters, stage: &Stage) -> Option<Self> {
         let eta = parameters.eta();
         let is_regular = eta.iter().all(|eta| eta.is_normal());
@@ -89,7 +89,7 @@ impl Decoder {
         Some(self.decode(row)?.error)
     }
 
-    /// The same with its derivatives.
+    /// The error with its derivatives. `None` next to a pole.
     #[inline(always)]
     pub fn columns(&self, row: &FieldRow) -> Option<Columns> {
         let Decoded {

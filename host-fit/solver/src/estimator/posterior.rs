@@ -111,7 +111,7 @@ impl Posterior {
         Self::from_covariance(covariance, parameters, noise)
     }
 
-    /// Of parameters with this covariance, for probes with this noise.
+    /// The posterior with this covariance, for probes with this noise.
     pub fn from_covariance(
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
@@ -125,7 +125,7 @@ impl Posterior {
         }
     }
 
-    /// Of some of the parameters.
+    /// The posterior of the parameters at the places `determined`.
     pub const fn from_sandwich(
         determined: Vec<usize>,
         covariance: DMatrix<f64>,

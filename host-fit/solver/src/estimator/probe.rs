@@ -187,29 +187,6 @@ mod tests {
     const VERTICAL: [f64; 3] = [180e-6, -390e-6, 270e-6];
 
     #[test]
-    fn a_probe_reads_what_the_formula_says() {
-        let parameters = parameters();
-        let lateral = to_rows(&parameters.lateral());
-        let plane = to_rows(&parameters.model_31().geometry().plane());
-        for (k, probe) in probes(&parameters).iter().enumerate() {
-            let values = &parameters.probes[k];
-            let along = |row: &[f64; 3]| (0..3).map(|j| row[j] * PLANAR_MM[j]).sum::<f64>();
-            let (u, w) = (along(&plane[k]), along(&lateral[k]));
-            let change: f64 = (0..3).map(|j| values[SLOPES + j] * VERTICAL[j]).sum();
-            let z = change / values[ETA];
-            let carried: f64 = (0..3).map(|j| values[CARRY + j] * VERTICAL[j] * 1e3).sum();
-            let mut shape = 0.0;
-            for (term, value) in TERMS.iter().zip(values).skip(SHAPES) {
-                let [p, q, r] = term.powers.map(i32::from);
-                shape += value * u.powi(p) * w.powi(q) * z.powi(r);
-            }
-            let expected = (values[ETA] + change) * (u + carried + shape);
-            let found = probe.signal_mm(PLANAR_MM, VERTICAL);
-            assert!((found - expected).abs() < 1e-14, "{k}: {found} {expected}");
-        }
-    }
-
-    #[test]
     fn the_derivatives_are_those_of_finite_differences() {
         let mut flat = parameters();
         flat.probes[1][SLOPES] = 2.0;

@@ -1,11 +1,9 @@
-//! Rows of a log in mm and mrad, and short blocks of them.
+//! Rows of a log in mm and mrad, by movement and in short blocks.
 //!
 //! Neighbouring rows see nearly the same pose: the mean of a few rows' residuals and derivatives
 //! holds their information on the parameters, and is a tenth of the work for all that follows. The
 //! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
-use super::probe::{Probe, Reading};
-use super::terms::PER_PROBE;
 use crate::estimator::robust::HALF;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage;
@@ -64,32 +62,13 @@ pub struct Rows {
     pub vertical_range: [f64; 3],
 }
 
-/// Mean residuals and derivatives of a block.
-#[derive(Clone, Debug)]
-pub struct Block {
-    /// Mean time of its rows, s.
-    pub time_s: f64,
-    /// How many rows: the sum of their weights.
-    pub rows: f64,
-    /// Signal less model of A, B, C, mm.
-    pub residual_mm: [f64; 3],
-    /// Derivatives of the model by X, Y (mm), Rz (mrad).
-    pub by_pose: [[f64; 3]; 3],
-    /// Derivatives by each probe's own parameters.
-    pub by_parameter: [[f64; PER_PROBE]; 3],
-    /// Derivatives by the lag of the reference, mm/s.
-    pub by_lag: [f64; 3],
-    /// Derivatives by k and h of each probe, mm K.
-    pub by_temperature: [[f64; 2]; 3],
-}
-
 impl Rows {
     /// The rows `selected` (ascending) of a dataset.
     pub fn new(dataset: &Dataset, selected: &[usize]) -> Self {
         Self::weighted(dataset, selected, &vec![1.0; selected.len()])
     }
 
-    /// The same with weights. A row without is left out; one below half says nothing about its
+    /// The rows `selected` with weights. A row of weight zero is left out; a row below half weight is not used for its
     /// neighbours' rates.
     pub fn weighted(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> Self {
         let mut trusted = vec![true; dataset.rows.len()];
@@ -189,55 +168,6 @@ impl Rows {
             ..*self
         };
         (means, first)
-    }
-
-    /// The blocks at given parameters, lag (s) and offsets of the reference (mm, mm, mrad) by
-    /// movement.
-    pub fn evaluate(&self, probes: &[Probe; 3], lag_s: f64, offsets_mm: &[[f64; 3]]) -> Vec<Block> {
-        let of_movement = |(movement, &offset_mm): (usize, &[f64; 3])| {
-            self.evaluate_movement(movement, probes, lag_s, offset_mm)
-        };
-        offsets_mm
-            .par_iter()
-            .enumerate()
-            .flat_map(of_movement)
-            .collect()
-    }
-
-    /// The blocks of a movement of [`movements`](Self::movements), as in [`Rows::evaluate`].
-    pub fn evaluate_movement(
-        &self,
-        movement: usize,
-        probes: &[Probe; 3],
-        lag_s: f64,
-        offset_mm: [f64; 3],
-    ) -> Vec<Block> {
-        self.blocks[self.movements[movement].clone()]
-            .par_iter()
-            .with_min_len(64)
-            .map(|block| mean(&self.rows[block.clone()], probes, lag_s, offset_mm))
-            .collect()
-    }
-
-    /// Signal less model of every row, mm, as in [`Rows::evaluate`].
-    pub fn residuals_mm(
-        &self,
-        probes: &[Probe; 3],
-        lag_s: f64,
-        offsets_mm: &[[f64; 3]],
-    ) -> Vec<[f64; 3]> {
-        let of_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
-            let residual = move |row: &FieldRow| {
-                let planar_mm = row.planar_mm(lag_s, offset);
-                [0, 1, 2].map(|k| {
-                    let gain = probes[k].gain(row.temperature_k[k]);
-                    row.signal_mm[k] - gain * probes[k].signal_mm(planar_mm, row.vertical)
-                })
-            };
-            self.rows[range].par_iter().with_min_len(256).map(residual)
-        };
-        let movements: Vec<_> = self.movement_rows().zip(offsets_mm).collect();
-        movements.into_par_iter().flat_map(of_movement).collect()
     }
 
     /// About `most` of the rows: the same number from each movement that moves, evenly, and at least
@@ -365,52 +295,4 @@ fn ranges(rows: &[FieldRow], movements: &[Range<usize>]) -> ([f64; 3], [f64; 3])
         }
     }
     (planar, vertical)
-}
-
-fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3]) -> Block {
-    let mut sum = Block {
-        time_s: 0.0,
-        rows: 0.0,
-        residual_mm: [0.0; 3],
-        by_pose: [[0.0; 3]; 3],
-        by_parameter: [[0.0; PER_PROBE]; 3],
-        by_lag: [0.0; 3],
-        by_temperature: [[0.0; 2]; 3],
-    };
-    for row in rows {
-        let planar_mm = row.planar_mm(lag_s, offset_mm);
-        sum.rows += row.weight;
-        sum.time_s += row.weight * row.time_s;
-        for (k, probe) in probes.iter().enumerate() {
-            let Reading {
-                signal_mm,
-                by_pose,
-                by_parameter,
-                ..
-            } = probe.read(planar_mm, row.vertical);
-            let gain = probe.gain(row.temperature_k[k]);
-            sum.residual_mm[k] += row.weight * (row.signal_mm[k] - gain * signal_mm);
-            for (sum, temperature_k) in sum.by_temperature[k].iter_mut().zip(row.temperature_k[k]) {
-                *sum += row.weight * signal_mm * temperature_k;
-            }
-            for (axis, by) in by_pose.into_iter().enumerate() {
-                let by = row.weight * gain * by;
-                sum.by_pose[k][axis] += by;
-                sum.by_lag[k] += by * row.rate_mm_per_s[axis];
-            }
-            for (sum, by) in sum.by_parameter[k].iter_mut().zip(by_parameter) {
-                *sum += row.weight * gain * by;
-            }
-        }
-    }
-    let share = 1.0 / sum.rows;
-    sum.time_s *= share;
-    for k in 0..3 {
-        sum.residual_mm[k] *= share;
-        sum.by_lag[k] *= share;
-        sum.by_pose[k].iter_mut().for_each(|x| *x *= share);
-        sum.by_parameter[k].iter_mut().for_each(|x| *x *= share);
-        sum.by_temperature[k].iter_mut().for_each(|x| *x *= share);
-    }
-    sum
 }

@@ -41,8 +41,8 @@ pub struct ReferenceLag {
 /// How well a log determines the parameters of a model of the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sandwich {
-    /// Of the parameters that have a standard error. The model does not fit the others, or the log does
-    /// not determine them; none has one where there are fewer clusters than parameters.
+    /// The posterior of the parameters that have a standard error. The others are not fitted, or the log does not
+    /// determine them. With fewer clusters than parameters no parameter has a standard error.
     pub posterior: Posterior,
     /// Standard errors as if rows were independent: the limit by the motion of the log alone. Zero for a parameter that
     /// is not fitted.
@@ -54,7 +54,7 @@ pub struct Sandwich {
     pub lag: Option<ReferenceLag>,
 }
 
-/// Of some unknowns.
+/// The standard errors of some unknowns.
 struct Errors {
     inverse: Square,
     undetermined: Vec<usize>,

@@ -1,4 +1,4 @@
-//! Whether a log can carry the field model, by the errors that it predicts for service.
+//! Errors in service by a posterior, and whether the field model or Model (31) has the smaller ones.
 
 use super::parameters::FieldParameters;
 use super::posterior::{FORM_MM, PoseErrors, Posterior};
@@ -33,16 +33,16 @@ pub struct ServiceVariance {
 /// The poses of a service: how errors of the parameters and of the signals show there, as means.
 #[derive(Clone, Debug)]
 pub struct Service {
-    /// Of X, Y, Rz: products of the derivatives by two parameters.
+    /// For X, Y, Rz, the products of the derivatives by two parameters.
     by_parameters: [Vec<[f64; COUNT]>; 3],
-    /// Of X, Y, Rz: variance by the noise of the probes.
+    /// For X, Y, Rz, the variance by the noise of the probes.
     by_noise: [f64; 3],
-    /// By the errors of their form.
+    /// The same by the errors of the form.
     by_form: [f64; 3],
 }
 
 impl Service {
-    /// Of probes with this noise at poses X, Y, Rz and Z, Rx, Ry (m, rad); `None` where the probes
+    /// The service of probes with this noise at poses X, Y, Rz and Z, Rx, Ry (m, rad); `None` where the probes
     /// do not determine a pose.
     pub fn new(
         parameters: &FieldParameters,
@@ -137,10 +137,10 @@ fn difference(
     Some(sum)
 }
 
-/// Which of the two models is better taken, and why.
+/// The field model against Model (31): the better choice, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// Whether it is the field model.
+    /// Whether the field model is the better choice.
     pub field: bool,
     /// Whether only the declared errors of the resets let the log carry it.
     pub by_resets: bool,
@@ -149,7 +149,7 @@ pub struct Comparison {
 }
 
 impl ServiceVariance {
-    /// Of the field model with this posterior, and of another one ((31), or an old one), over
+    /// The variances of the field model with this posterior, and the difference to another model ((31) or an old one), over
     /// X, Y, Rz and Z, Rx, Ry of the largest magnitudes `ranges` (m, rad). Infinite where the
     /// probes do not determine the pose.
     pub fn new(
@@ -224,7 +224,7 @@ impl ServiceVariance {
 }
 
 impl Comparison {
-    /// Of a fit beside one of Model (31) to the same rows, over X, Y, Rz and Z, Rx, Ry of the
+    /// Compares a fit of the field model with one of Model (31) to the same rows, over X, Y, Rz and Z, Rx, Ry of the
     /// largest magnitudes `ranges` (m, rad).
     pub fn new(
         parameters: &FieldParameters,

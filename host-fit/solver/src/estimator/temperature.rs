@@ -33,7 +33,7 @@ impl Coefficient {
     /// Rows of the covariance of a posterior with k and h.
     pub const ROWS: usize = COUNT + Self::ALL.len();
 
-    /// Of a probe and a sensor.
+    /// The coefficient of a probe and a sensor.
     pub const fn new(probe: usize, sensor: usize) -> Self {
         Self { probe, sensor }
     }
@@ -83,7 +83,7 @@ pub(super) const OF_SENSORS: f64 = 2.8e-5;
 /// Errors of k and of h by the form of the model, 1/K: expansion moves a probe over its magnet, where the field
 /// differs. Standard deviation over simulated stages where one temperature changes.
 const OF_FORM: f64 = 3.5e-5;
-/// The same for their sum, where both change alike and stage and framework grow together.
+/// Error of k + h by the form, 1/K: both temperatures change alike, stage and framework grow together.
 const OF_FORM_TOGETHER: f64 = 1.3e-5;
 
 /// The sensors of temperature of some logs.

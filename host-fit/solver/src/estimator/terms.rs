@@ -103,47 +103,34 @@ pub fn names(rows: usize) -> Vec<String> {
     (0..COUNT).map(name).chain(temperature).take(rows).collect()
 }
 
-/// The coefficients of p, in the order of [`TERMS`], where the decoder has them.
-pub(super) fn shape(c: [f64; SHAPE]) -> Shape<f64> {
-    let [
-        uw,
-        uw2,
-        uz2,
-        u3,
-        uwz,
-        uw2z,
-        u3z,
-        uz3,
-        w2,
-        wz,
-        z2,
-        u2,
-        w2z,
-        w3,
-        wz2,
-        u2z,
-        u2w,
-        z3,
-    ] = c;
-    Shape {
-        u_w_w: [uw2, uw2z],
-        u_w: [uw, uwz],
-        u_z_z: [uz2, uz3],
-        u_u_u: [u3, u3z],
-        u_u: [u2, u2z],
-        w_w: [w2, w2z],
-        w_z: [wz, wz2],
-        z_z: [z2, z3],
-        u_u_w: u2w,
-        w_w_w: w3,
+/// Where the decoder has the coefficient of the monomial with these powers of u, w and z.
+fn coefficient(p: &mut Shape<f64>, [u, w, z]: [u8; 3]) -> &mut f64 {
+    let z = usize::from(z);
+    match (u, w) {
+        (1, 2) => &mut p.u_w_w[z],
+        (1, 1) => &mut p.u_w[z],
+        (1, 0) => &mut p.u_z_z[z - 2],
+        (3, _) => &mut p.u_u_u[z],
+        (2, 0) => &mut p.u_u[z],
+        (2, _) => &mut p.u_u_w,
+        (_, 3) => &mut p.w_w_w,
+        (_, 2) => &mut p.w_w[z],
+        (_, 1) => &mut p.w_z[z - 1],
+        _ => &mut p.z_z[z - 2],
     }
+}
+
+/// The coefficients of p, in the order of [`TERMS`], where the decoder has them.
+pub(super) fn shape(coefficients: [f64; SHAPE]) -> Shape<f64> {
+    let mut p = Shape::default();
+    for (term, value) in TERMS[SHAPES..].iter().zip(coefficients) {
+        *coefficient(&mut p, term.powers) = value;
+    }
+    p
 }
 
 /// The coefficients of p in the order of [`TERMS`]: the inverse of [`shape`].
 pub(super) fn shape_list(p: &Shape<f64>) -> [f64; SHAPE] {
-    [
-        p.u_w[0], p.u_w_w[0], p.u_z_z[0], p.u_u_u[0], p.u_w[1], p.u_w_w[1], p.u_u_u[1], p.u_z_z[1],
-        p.w_w[0], p.w_z[0], p.z_z[0], p.u_u[0], p.w_w[1], p.w_w_w, p.w_z[1], p.u_u[1], p.u_u_w,
-        p.z_z[1],
-    ]
+    let mut p = *p;
+    std::array::from_fn(|k| *coefficient(&mut p, TERMS[SHAPES + k].powers))
 }

@@ -6,9 +6,10 @@
 //! same time: without drift this is the same as solving for each movement's offset. A and B are
 //! whitened jointly with C, for all three see the same reference.
 
+use super::blocks::Block;
 use super::parameters::FieldParameters;
 use super::probe::probes;
-use super::rows::{Block, Rows};
+use super::rows::Rows;
 use super::temperature::Coefficient;
 use super::terms::{COUNT, PER_PROBE};
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
@@ -69,7 +70,7 @@ impl FieldEquations<'_> {
         }
     }
 
-    /// Of blocks that are evaluated already, with no offset.
+    /// The normal equations of evaluated blocks, with no offset.
     pub fn sum_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
         let movement = |k: usize| {
             let blocks = &blocks[self.rows.movements[k].clone()];

@@ -52,31 +52,3 @@ impl ZeroDeviation {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use hallstage_input::shipped;
-
-    /// Aligned probes with arms 0.1975, -0.1975, -0.36 m and eta 1: a pose offset of (x, y, rz)
-    /// reads y + 0.1975 rz, y - 0.1975 rz, x - 0.36 rz.
-    #[test]
-    fn a_mean_error_becomes_the_deviation_of_each_probe() {
-        let designed = Parameters::designed(&shipped::stage());
-        let range = Range {
-            low: -10e-6,
-            high: 10e-6,
-        };
-        let within = ZeroDeviation::from_mean_error(&designed, [3e-6, 2e-6, 10e-6], &range);
-        for (have, want) in within.delta_m.iter().zip([3.975e-6, 0.025e-6, -0.6e-6]) {
-            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
-        }
-        assert!(!within.is_beyond && within.pose == [3e-6, 2e-6, 10e-6]);
-        let beyond = ZeroDeviation::from_mean_error(&designed, [-30e-6, 40e-6, 0.0], &range);
-        assert!(beyond.is_beyond && beyond.pose == [-30e-6, 40e-6, 0.0]);
-        let given = ZeroDeviation::given(&designed, beyond.delta_m);
-        for (have, want) in given.pose.iter().zip(beyond.pose) {
-            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
-        }
-    }
-}
