@@ -3,7 +3,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`objective`] | the fitness as a cost function of a search |
-//! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
+//! | [`search`] | SHTLBO and its ablations, for any cost function |
 //! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 //!
 //! ```
