@@ -28,12 +28,6 @@ const CODES: [[i32; 2]; 2] = [[-32_768, 32_767], [-8_388_608, 8_388_607]];
 /// Units for a time without a unit, each with the smallest step between rows that suits it: the period is then
 /// 0.1 ms to 100 ms.
 const STEPS: [(&str, f64); 4] = [("ns", 1e5), ("us", 100.0), ("ms", 0.1), ("s", 1e-4)];
-/// Alternative sets of columns: a log needs one of each line.
-const SETS: [&[[Quantity; 3]]; 2] = [
-    &[Quantity::BEAMS, Quantity::PLANAR],
-    &[Quantity::GAPS, Quantity::GAP_LENGTHS, Quantity::VERTICAL],
-];
-
 /// A draft of `stage.toml`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Draft {
@@ -277,8 +271,9 @@ impl Lines {
                 }
                 [] => {
                     // Only one of alternative sets is needed.
-                    let mut sets = SETS
-                        .iter()
+                    let alternatives: [&[_]; 2] = [&Quantity::REFERENCES, &Quantity::VERTICALS];
+                    let mut sets = alternatives
+                        .into_iter()
                         .filter(|sets| sets.iter().flatten().any(|q| *q == quantity));
                     let missed = sets.all(|sets| {
                         let there = sets.iter().find(|set| has(*set));

@@ -65,8 +65,8 @@ pub(super) fn columns(
     };
     let [time] = header.all([Quantity::Time])?;
     let hall = header.all(Quantity::HALL)?;
-    let vertical = header.one_of(&[Quantity::GAPS, Quantity::GAP_LENGTHS, Quantity::VERTICAL])?;
-    let sets = [Quantity::BEAMS, Quantity::PLANAR];
+    let vertical = header.one_of(&Quantity::VERTICALS)?;
+    let sets = Quantity::REFERENCES;
     let is_there = sets.iter().flatten().any(|q| header.find(*q).is_some());
     let is_needed = is_there || reference == ReferenceUse::Required;
     let reference = is_needed.then(|| header.one_of(&sets)).transpose()?;

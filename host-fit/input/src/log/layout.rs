@@ -109,6 +109,10 @@ impl Quantity {
     pub const BEAMS: [Self; 3] = [Self::BeamX, Self::BeamY1, Self::BeamY2];
     /// The reference pose in SI units.
     pub const PLANAR: [Self; 3] = [Self::X, Self::Y, Self::Rz];
+    /// Alternative sets for the reference.
+    pub const REFERENCES: [[Self; 3]; 2] = [Self::BEAMS, Self::PLANAR];
+    /// Alternative sets for the vertical pose.
+    pub const VERTICALS: [[Self; 3]; 3] = [Self::GAPS, Self::GAP_LENGTHS, Self::VERTICAL];
 
     fn entry(self) -> &'static Entry {
         &TABLE[self as usize]

@@ -154,15 +154,4 @@ mod tests {
         assert_eq!(to_key("Hall  A"), "hall_a");
         assert_eq!(to_key("IFM-Y1"), "ifm_y1");
     }
-
-    #[test]
-    fn both_micro_signs_and_the_degree_are_units() {
-        for um in ["um", "\u{b5}m", "\u{3bc}m", " um "] {
-            assert_eq!(Kind::Length.unit(um), Some(1e-6), "{um:?}");
-        }
-        assert_eq!(Kind::Angle.unit("\u{b5}rad"), Some(1e-6));
-        assert_eq!(Kind::Angle.unit("\u{b0}"), Kind::Angle.unit("deg"));
-        assert_eq!(Kind::Time.unit_in_name("t (\u{3bc}s)"), Some(1.0));
-        assert_eq!(Kind::Length.unit("s"), None);
-    }
 }

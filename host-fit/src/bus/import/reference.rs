@@ -154,7 +154,7 @@ impl Cells {
     fn find(table: &Table<'_>, stage: &Stage) -> Result<([Quantity; 3], Self), LogError> {
         let header = Header::new(&table.head, &stage.log, UnknownColumns::LeaveOut)?;
         let [time] = header.all([Quantity::Time])?;
-        let (quantities, [a, b, c]) = header.one_of(&[Quantity::BEAMS, Quantity::PLANAR])?;
+        let (quantities, [a, b, c]) = header.one_of(&Quantity::REFERENCES)?;
         let value = |quantity: Quantity, source: Source| {
             let (limit, unit) = match quantity.kind() {
                 Kind::Angle => (ROTATION_MAX_RAD, "rad"),

@@ -169,14 +169,6 @@ fn a_gap_in_time_shows_as_frames_missed_and_another_period_does_not() {
 }
 
 #[test]
-fn saturated_codes_are_kept_for_the_decoder() {
-    let text = spoilt(",97,", ",32767,");
-    let kept = read_text(&text, &ReadOptions::DECODE).expect("kept");
-    assert_eq!(kept.dataset.rows[1].frame.hall(), [32767, 87, -6]);
-    assert_eq!((kept.dataset.rows.len(), kept.skipped_rows), (6, 0));
-}
-
-#[test]
 fn several_logs_are_one_dataset_hashed_in_their_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let (plain, packed) = (folder.path().join("a.csv.gz"), folder.path().join("b.csv"));
@@ -191,6 +183,7 @@ fn several_logs_are_one_dataset_hashed_in_their_order() {
         .dataset;
     let want = [(0, 0, 0..3), (0, 4, 3..6), (1, 3, 6..9), (1, 4, 9..12)];
     assert_eq!(movements(&dataset), want);
+    assert!(dataset.movement_name(&dataset.movements[2]).ends_with(":3"));
     let slots: Vec<_> = dataset.rows.iter().map(|row| row.movement).collect();
     assert_eq!(slots, [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]);
     assert_eq!(

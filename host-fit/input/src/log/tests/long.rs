@@ -95,29 +95,6 @@ fn rows_that_are_left_out_of_many_movements_are_reported_in_few_lines() {
 }
 
 #[test]
-fn a_ditto_mark_in_a_column_that_is_left_out_does_not_swallow_lines() {
-    let lines = lines();
-    let noted = lines.iter().enumerate().map(|(k, line)| match k % 3 {
-        _ if k == 0 => format!("{line},note\n"),
-        0 => format!("{line},\"by hand, twice\"\n"),
-        1 => format!("{line},\"\n"),
-        _ => format!("{line},the \"same\" again\n"),
-    });
-    let text: String = noted.collect();
-    let ignoring = stage_with("ignore = [\"note\"]");
-    let reading = read_bytes(
-        text.as_bytes(),
-        Path::new("log.csv"),
-        &ignoring,
-        &ReadOptions::default(),
-    );
-    assert_eq!(reading.expect("sound").dataset.rows.len(), ROWS);
-    // In a column that is read it is a bad cell.
-    let error = refused(&spoilt_row(7, ",1325,", ",\","));
-    assert_eq!(place(&error).0, line_of(7));
-}
-
-#[test]
 fn headers_and_lines_that_no_log_has_are_refused_by_their_length() {
     let commas = |count: usize| format!("{}\n1,2\n", ",".repeat(count));
     let error = refused(&commas(COLUMNS_MAX));

@@ -108,21 +108,3 @@ fn rows_out_of_order_stay_refused() {
     let key = "movement";
     assert!(matches!(missing, LogProblem::MissingColumn { key: found, .. } if found == key));
 }
-
-#[test]
-fn one_file_for_each_movement() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let paths: Vec<_> = (0..3)
-        .map(|k| folder.path().join(format!("run{k}.csv")))
-        .collect();
-    for (k, path) in (0..).zip(&paths) {
-        std::fs::write(path, log_at((0..30 + k).map(|k| 2 * k))).expect("written");
-    }
-    let reading = read(&paths, stage(), &ReadOptions::default()).expect("sound");
-    let want = [(0, 0, 0..30), (1, 0, 30..61), (2, 0, 61..93)];
-    assert_eq!(movements(&reading.dataset), want);
-    let codes: Vec<Code> = reading.warnings.iter().map(|found| found.code()).collect();
-    assert_eq!(codes, [Code::MovementsByTime; 3]);
-    let name = reading.dataset.movement_name(&reading.dataset.movements[1]);
-    assert!(name.contains("run1.csv"));
-}

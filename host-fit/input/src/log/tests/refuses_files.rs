@@ -29,24 +29,6 @@ fn no_log_no_file_and_a_folder() {
 }
 
 #[test]
-fn the_same_log_twice() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    let renamed = LOG.replace("\n4,", "\n5,");
-    std::fs::write(at("a"), LOG).expect("written");
-    std::fs::write(at("b"), LOG.replace(",97,", ",98,")).expect("written");
-    std::fs::write(at("c"), gzip(renamed.as_bytes())).expect("written");
-    let logs = [at("a"), at("b"), at("c")];
-    let error = read(&logs, stage(), &ReadOptions::default()).expect_err("a and c are one");
-    let LogProblem::SameLog { first } = &error.problem else {
-        panic!("{error}");
-    };
-    assert_eq!((&error.place.path, first), (&logs[2], &logs[0]));
-    assert!(error.to_string().contains("name each log once"), "{error}");
-    read(&logs[..2], stage(), &ReadOptions::default()).expect("two logs");
-}
-
-#[test]
 fn binary_files() {
     for (bytes, part) in [
         (&b"\x7fELF\x02\x01\x01\0\0\0"[..], "(byte 0)"),

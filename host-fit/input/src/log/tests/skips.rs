@@ -44,20 +44,6 @@ fn bad_cells_are_left_out_and_counted_by_reason() {
 }
 
 #[test]
-fn a_gap_left_by_a_bad_row_shows_in_the_sequence() {
-    let text = LOG.replace(",97,", ",x,");
-    let reading = read_text(&text, &SKIP).expect("read");
-    let sequences: Vec<_> = reading
-        .dataset
-        .rows
-        .iter()
-        .map(|row| row.frame.sequence())
-        .collect();
-    // The median of the steps left, 2, 2 and 4 ms, is the servo's.
-    assert_eq!(sequences, [0, 2, 0, 1, 2]);
-}
-
-#[test]
 fn a_movement_of_which_nothing_is_left_gives_a_warning() {
     let text = LOG
         .replace(",13,14", ",a,14")
