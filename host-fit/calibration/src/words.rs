@@ -1,9 +1,12 @@
-//! The sentences: every finding becomes words here, for terminals, pages, JSON and Python alike.
+//! The sentences: every finding and every refusal becomes words here, for terminals, pages, JSON and Python alike.
 
 mod causes;
+mod evidence;
 mod finding;
+mod refusal;
 
 pub use finding::message;
+pub use refusal::{NO_FIT, WordedRefusal, refusal};
 
 use hallstage_input::finding::{Finding, Severity};
 use serde::ser::SerializeStruct;
@@ -39,7 +42,7 @@ pub fn worded(findings: &[Finding]) -> Vec<Worded<'_>> {
 /// Serializes findings with their messages: for a field of a report.
 ///
 /// # Errors
-/// Those of the serializer.
+/// The errors of the serializer.
 pub fn serialize<S: Serializer>(findings: &[Finding], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(findings.iter().map(Worded))
 }
@@ -53,14 +56,6 @@ pub fn messages(findings: &[Finding]) -> Vec<String> {
 pub fn paragraph(findings: &[Finding], least: Severity) -> String {
     let severe = findings.iter().filter(|finding| finding.severity >= least);
     severe.map(message).collect::<Vec<_>>().join(" ")
-}
-
-/// A unit of JSON as sentences write it.
-fn sign(unit: &str) -> String {
-    match unit {
-        "um" | "urad" | "us" => unit.replacen('u', "µ", 1),
-        unit => unit.to_owned(),
-    }
 }
 
 /// Text with a capital at its start and a full stop at its end.

@@ -6,7 +6,7 @@ macro_rules! channels {
     ($($(#[doc = $doc:literal])* $channel:ident, $name:literal, $title:literal;)*) => {
         /// A channel, a group of channels that share a cause, or an axis of the pose.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        #[expect(missing_docs, reason = "the titles say what each one is")]
+        #[expect(missing_docs, reason = "the titles say what they are")]
         pub enum Channel { $($channel,)* }
 
         impl Channel {

@@ -124,12 +124,12 @@ impl Finding {
         (!names.is_empty()).then(|| names.join(", "))
     }
 
-    /// The movement of its first row.
+    /// The movement where it begins.
     pub fn movement(&self) -> Option<&str> {
         self.place.as_ref().map(|place| place.movement.as_str())
     }
 
-    /// The time of its first row in the log, us.
+    /// The time in the log when it begins, us.
     pub fn t_us(&self) -> Option<i64> {
         self.place.as_ref().map(|place| place.t_us)
     }

@@ -13,6 +13,7 @@ use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
 use host_fit::calibrate::{Outcome, Updated, log_warnings, other_scales};
+use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::LogReading;
@@ -307,8 +308,10 @@ impl Calibration {
         let blob = (&self.set, self.known.as_ref());
         let updated = work::run(py, || Updated::new(blob, reading, designed, what, created))?;
         let updated = updated.map_err(|error| recalibrate_error(py, &error))?;
-        if let Some(refusal) = &updated.refusal {
-            return Err(refused(py, refusal, &updated.new.diagnosis.findings));
+        if let Some(refusal) = updated.refusal_message() {
+            let code = updated.refusal.as_ref().map(Refusal::code);
+            let findings = &updated.new.diagnosis.findings;
+            return Err(refused(py, &refusal, code, findings));
         }
         Ok(Self {
             set: updated.new.set.clone(),

@@ -67,11 +67,11 @@ pub fn arrays_error(py: Python<'_>, error: &LogError, arguments: &[(String, Stri
 }
 
 /// A log that is no good for a calibration.
-pub fn refused(py: Python<'_>, why: &str, findings: &[Finding]) -> PyErr {
+pub fn refused(py: Python<'_>, why: &str, code: Option<&str>, findings: &[Finding]) -> PyErr {
     let made = crate::finding::list(py, findings);
     made.map_or_else(
         |error| error,
-        |findings| own(py, "LogRefused", (why, findings)),
+        |findings| own(py, "LogRefused", (why, findings, code)),
     )
 }
 
@@ -122,7 +122,7 @@ pub fn recalibrate_error(py: Python<'_>, error: &RecalibrateError) -> PyErr {
         RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => {
             PyValueError::new_err(error.to_string())
         }
-        _ => refused(py, &error.to_string(), &[]),
+        _ => refused(py, &error.to_string(), None, &[]),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated};
+use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::judge::Zeros;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::stage::Stage as Designed;
@@ -96,7 +97,13 @@ impl Evaluation {
     /// Why the calibration does not describe these logs, and what to do, or None if it does.
     #[getter]
     fn refusal(&self) -> Option<String> {
-        self.evaluated.refusal()
+        self.evaluated.refusal_message()
+    }
+
+    /// The same as a name that stays: "other_log"; None if it does.
+    #[getter]
+    fn refusal_code(&self) -> Option<&'static str> {
+        self.evaluated.refusal.as_ref().map(Refusal::code)
     }
 
     /// Errors of the rows, zero deviations taken off, m, m, rad.

@@ -6,9 +6,11 @@ use crate::error::{calibrate_error, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
-use host_fit::calibrate::{FitOrder, Limits, check_refusal, choose_loss};
+use host_fit::calibrate::{FitOrder, Limits, choose_loss};
 use host_fit::calibration::diagnose::diagnose_log;
+use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
+use host_fit::calibration::words;
 use host_fit::solver::estimator::draw::Draw;
 use host_fit::solver::estimator::paper::Parameters;
 use host_fit::solver::estimator::robust::Loss;
@@ -49,13 +51,16 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     let (diagnosis, refusal) = work::run(py, || {
         let fitted = fit_rows(&reading.dataset, stage, &settings);
         let diagnosis = diagnose_log(&reading.dataset, stage, fitted.as_ref());
-        let refusal = check_refusal(fitted.as_ref(), &diagnosis.findings);
+        let refusal = Refusal::from_fit(fitted.as_ref(), &diagnosis.findings);
         (diagnosis, refusal)
     })?;
     let verdict = finding::figures(py, &diagnosis.verdict)?;
     let findings = finding::list(py, &diagnosis.findings)?;
     let class = py.import("hallstage._results")?.getattr("Findings")?;
-    class.call1((findings, verdict, refusal))
+    let why = refusal
+        .as_ref()
+        .map(|of| words::refusal(of, &diagnosis.findings));
+    class.call1((findings, verdict, why, refusal.as_ref().map(Refusal::code)))
 }
 
 /// Fits the calibration of a stage to logs, diagnoses them, and takes off the faults that can be: what
@@ -152,8 +157,9 @@ pub fn fit(
             Calibration::from_fit(outcome, report, Arc::clone(&log.reading), designed, stage)
         }
         _ => {
-            let why = outcome.refusal.as_deref().unwrap_or_default();
-            Err(refused(py, why, &outcome.diagnosis.findings))
+            let why = outcome.refusal_message().unwrap_or_default();
+            let code = outcome.refusal.as_ref().map(Refusal::code);
+            Err(refused(py, &why, code, &outcome.diagnosis.findings))
         }
     }
 }

@@ -4,6 +4,7 @@ use super::log_warnings;
 use crate::report::errors::RowErrors;
 use crate::report::result::{Circumstances, Judged, Report};
 use crate::report::verdict::{End, Subject};
+use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
 use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use hallstage_calibration::fit::counted;
 use hallstage_calibration::judge::predicted::Validity;
@@ -11,8 +12,7 @@ use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
-use hallstage_input::axis::{PLANAR, sign};
-use hallstage_input::finding::Severity;
+use hallstage_input::axis::{Axis, PLANAR};
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -50,8 +50,8 @@ pub struct Evaluation {
     of_rows: Judgement,
     zeros: Zeros<'static>,
     limit: f64,
-    /// The error beyond the limit, if one is.
-    pub problem: Option<String>,
+    /// Why the blob does not do for these logs; `None` if it does.
+    pub refusal: Option<Refusal>,
 }
 
 impl Evaluation {
@@ -100,7 +100,7 @@ impl Evaluation {
         let usual = if is_field(set) { 3.0 } else { 10.0 };
         let limit = order.limit.unwrap_or(usual);
         Ok(Self {
-            problem: beyond_limit(set, &comparable, limit),
+            refusal: other_log(set, &comparable, limit),
             set: set.clone(),
             stage: stage.clone(),
             log,
@@ -129,13 +129,15 @@ impl Evaluation {
             by_row: &self.by_row,
             over_rows: self.of_rows.errors,
         };
-        Report::from_judgement(judged, &circumstances)
+        let mut report = Report::from_judgement(judged, &circumstances);
+        report.set_refusal(self.refusal.as_ref());
+        report
     }
 
     /// How it ended, for reports.
     pub fn subject(&self) -> Subject<'_> {
         let own = self.set.fit.rms.map(f64::from);
-        let end = self.problem.as_deref();
+        let end = self.refusal.as_ref();
         Subject {
             end: end.map_or(End::Judged, End::Failed),
             diagnosis: &self.diagnosis,
@@ -147,24 +149,9 @@ impl Evaluation {
     }
 
     /// Why the blob does not do for these logs, and what to do; `None` if it does.
-    pub fn refusal(&self) -> Option<String> {
-        let problem = self.problem.as_deref()?;
-        // What the diagnosis found explains more than a remedy; warnings stand above already.
-        let found = &self.diagnosis.findings;
-        let refusals = words::paragraph(found, Severity::Refuse);
-        let more = match (refusals.as_str(), found.iter().any(|f| f.severity == Severity::Warn)) {
-            ("", true) => String::new(),
-            ("", false) if is_field(&self.set) => {
-                ". Is it the blob of this stage? If it is, and channels and scales are right, bring it up to date with host-fit recalibrate"
-                    .to_owned()
-            }
-            ("", false) => {
-                ". If channels and scales are right, take the field model, with a log of all six axes moving at once"
-                    .to_owned()
-            }
-            (refusals, _) => format!(". {refusals}"),
-        };
-        Some(format!("{problem}{more}"))
+    pub fn refusal_message(&self) -> Option<String> {
+        let refusal = self.refusal.as_ref()?;
+        Some(words::refusal(refusal, &self.diagnosis.findings))
     }
 }
 
@@ -172,20 +159,22 @@ fn is_field(set: &ParameterSet) -> bool {
     set.model == ModelKind::Field
 }
 
-/// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
-/// has none to compare with.
-fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
-    let own = |axis: usize| f64::from(set.fit.rms[axis]);
-    let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
-    let worst = (0..3)
-        .filter(|&axis| own(axis) > 0.0)
-        .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-    let (axis, unit) = (PLANAR[worst].name, sign(PLANAR[worst].micro));
-    (ratio(worst) > limit).then(|| {
-        let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
-        format!(
-            "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
-             the logs that it was fitted to, more than {limit} times as much (--limit)"
-        )
+/// The refusal by the largest ratio of an error to the blob's own error, if that is beyond the limit. The blob of an
+/// exact fit has no errors to compare with.
+fn other_log(set: &ParameterSet, errors: &PoseError, factor: f64) -> Option<Refusal> {
+    let beyond = |(k, axis): (usize, &'static Axis)| Beyond {
+        axis,
+        rms: errors.axes[k].rms,
+        limit: f64::from(set.fit.rms[k]),
+    };
+    let errors = PLANAR.iter().enumerate().map(beyond);
+    let ratio = |error: &Beyond| error.rms / error.limit;
+    let errors = errors.filter(|error| error.limit > 0.0);
+    let worst = errors.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+    let is_field = is_field(set);
+    (ratio(&worst) > factor).then_some(Refusal::OtherLog {
+        worst,
+        factor,
+        is_field,
     })
 }

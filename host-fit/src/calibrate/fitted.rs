@@ -1,14 +1,14 @@
 //! A fit with the decisions around it.
 
-use super::{Limits, failure};
+use super::Limits;
 use crate::report::result::{Choice, Circumstances, Report};
 use crate::report::verdict::{End, Subject};
-use hallstage_calibration::diagnose::of_fit as of_residuals;
-use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
+use hallstage_calibration::diagnose::fit_checks::over_noise;
+use hallstage_calibration::diagnose::refusal::Refusal;
+use hallstage_calibration::diagnose::{Diagnosis, ERROR_TO_NOISE_MAX, diagnose_log};
 use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
-use hallstage_input::finding::Severity;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::{Projection, SolveError, Solver};
@@ -41,7 +41,7 @@ pub struct Outcome {
     /// The faults of the log, and the verdict.
     pub diagnosis: Diagnosis,
     /// Why it is not to be used; `None` where it may be.
-    pub refusal: Option<String>,
+    pub refusal: Option<Refusal>,
     /// Whether there is a blob to write: of a fit that is not refused, or that is forced.
     pub has_blob: bool,
     /// Whether the search was ended before its time.
@@ -101,7 +101,7 @@ impl FitOrder {
             limits: self.limits,
         };
         let refusal = match &outcome.fitted {
-            Err(error) => Some(failure(error, &outcome.diagnosis.findings)),
+            Err(error) => Some(Refusal::no_fit(error, &outcome.diagnosis.findings)),
             Ok(fit) => outcome
                 .refusal_of(fit)
                 .or_else(|| unfinished(fit, log).filter(|_| is_interrupted)),
@@ -109,8 +109,9 @@ impl FitOrder {
         let force = self.settings.force;
         outcome.has_blob = outcome.fitted.is_ok() && (refusal.is_none() || force);
         if let (Some(cause), true, false) = (&refusal, is_interrupted, outcome.has_blob) {
+            let cause = words::refusal(cause, &outcome.diagnosis.findings);
             return Err(CalibrateError::Interrupted(format!(
-                "nothing was written: {cause}. --force writes it all the same"
+                "nothing was written. {cause} --force writes it in spite of that"
             )));
         }
         if let Ok(fit) = &mut outcome.fitted {
@@ -134,16 +135,24 @@ impl Outcome {
     }
 
     /// Why a fit is not to be used: findings, or errors beyond the limits.
-    fn refusal_of(&self, fit: &Fit) -> Option<String> {
-        let refused = words::paragraph(&self.diagnosis.findings, Severity::Refuse);
-        if !refused.is_empty() {
-            return Some(format!("the log is refused: {refused}"));
+    fn refusal_of(&self, fit: &Fit) -> Option<Refusal> {
+        if let Some(refusal) = Refusal::from_findings(&self.diagnosis.findings) {
+            return Some(refusal);
         }
-        let on_log = || (fit.judgement.errors.axes.map(|axis| axis.rms), "on the log");
-        let (rms, which) = self
-            .in_service()
-            .map_or_else(on_log, |rms| (rms, "in service"));
-        self.limits.exceeded(rms, which)
+        let in_service = self.in_service();
+        let on_log = || fit.judgement.errors.axes.map(|axis| axis.rms);
+        let errors = self.limits.exceeded(in_service.unwrap_or_else(on_log));
+        let is_in_service = in_service.is_some();
+        (!errors.is_empty()).then_some(Refusal::BeyondLimit {
+            errors,
+            is_in_service,
+        })
+    }
+
+    /// Why it is not to be used, in words.
+    pub fn refusal_message(&self) -> Option<String> {
+        let refusal = self.refusal.as_ref()?;
+        Some(words::refusal(refusal, &self.diagnosis.findings))
     }
 
     /// What goes beside the blob: what is known of a field model; `None` of others.
@@ -195,17 +204,14 @@ impl Outcome {
             dataset: fit.rows(&log.dataset),
             ..Circumstances::new(log, stage, elapsed_s, diagnosis)
         };
-        Some(Report::from_fit(fit, &choice, &circumstances))
+        let mut report = Report::from_fit(fit, &choice, &circumstances);
+        report.set_refusal(self.refusal.as_ref());
+        Some(report)
     }
 }
 
-/// Why an interrupted search is not to be written: the errors of a finished search are little more than noise.
-fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
-    let ratio = of_residuals::over_noise(fit, fit.rows(&log.dataset));
-    (ratio > of_residuals::ERROR_TO_NOISE_MAX).then(|| {
-        format!(
-            "the best so far has errors of {ratio:.1} times the noise from sample to sample, more than {}: let it run longer",
-            of_residuals::ERROR_TO_NOISE_MAX
-        )
-    })
+/// The refusal of a search that was interrupted too early: a finished search leaves little but noise.
+fn unfinished(fit: &Fit, log: &LogReading) -> Option<Refusal> {
+    let over_noise = over_noise(fit, fit.rows(&log.dataset));
+    (over_noise > ERROR_TO_NOISE_MAX).then_some(Refusal::Unfinished { over_noise })
 }

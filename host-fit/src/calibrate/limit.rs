@@ -1,8 +1,12 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
-use hallstage_input::axis::{PLANAR, sign};
+use hallstage_calibration::diagnose::refusal::Beyond;
+use hallstage_input::axis::PLANAR;
 use hallstage_input::log::layout::Kind;
 use std::str::FromStr;
+
+/// The kinds of units of X, Y, Rz.
+const KINDS: [Kind; 3] = [Kind::Length, Kind::Length, Kind::Angle];
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,12 +25,7 @@ impl FromStr for Limits {
             let axis = axis.ok_or_else(wrong)?;
             let is_digit = |c: char| c.is_ascii_digit() || c == '.';
             let (number, unit) = value.split_at(value.rfind(is_digit).map_or(0, |at| at + 1));
-            let kind = if PLANAR[axis].unit == "m" {
-                Kind::Length
-            } else {
-                Kind::Angle
-            };
-            let si = kind.unit(unit).ok_or_else(wrong)?;
+            let si = KINDS[axis].unit(unit).ok_or_else(wrong)?;
             let number = number.trim().parse();
             let number: f64 = number.map_err(|_| wrong())?;
             if !(number.is_finite() && number > 0.0) {
@@ -41,22 +40,14 @@ impl FromStr for Limits {
 }
 
 impl Limits {
-    /// The axes with an rms error (m, m, rad) beyond the limit; `None` if there are none. `which` names the errors: in
-    /// service or on the log.
-    pub fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
-        let beyond = (0..3).filter_map(|axis| {
+    /// The rms errors (m, m, rad) that are beyond their limits.
+    pub fn exceeded(&self, rms: [f64; 3]) -> Vec<Beyond> {
+        let beyond = |axis: usize| {
             let (limit, rms) = (self.0[axis]?, rms[axis]);
-            let (name, unit) = (PLANAR[axis].key, sign(PLANAR[axis].micro));
-            (rms > limit).then(|| {
-                format!(
-                    "{name} {:.3} {unit} rms, limit {:.3} {unit}",
-                    rms * 1e6,
-                    limit * 1e6
-                )
-            })
-        });
-        let errors = beyond.collect::<Vec<_>>().join("; ");
-        (!errors.is_empty()).then(|| format!("the errors {which} are beyond --limit: {errors}."))
+            let axis = &PLANAR[axis];
+            (rms > limit).then_some(Beyond { axis, rms, limit })
+        };
+        (0..3).filter_map(beyond).collect()
     }
 }
 

@@ -20,59 +20,17 @@ use crate::report::errors::errors;
 use crate::report::figure::{Group, group};
 use crate::report::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{Fit, FitError};
-use hallstage_calibration::judge::identify::FitFailure;
-use hallstage_calibration::words;
-use hallstage_input::finding::{Finding, Severity};
+use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 use serde_json::json;
 
-/// What comes before the cause of a fit that failed.
-pub const NOT_WRITTEN: &str = "the fit failed its own checks, and no parameter blob was written: ";
-
 /// The warnings of a log that is diagnosed, which reports another rate itself.
 pub fn log_warnings(log: &LogReading) -> Vec<String> {
     words::messages(&log.warnings)
-}
-
-/// Whether findings explain why a fit failed.
-fn is_explained(error: &FitError, findings: &[Finding]) -> bool {
-    // A model that does not describe the log is the last thing to be suspected.
-    let least = match error {
-        FitError::Failed(FitFailure::NotDescribed { .. }) => Severity::Warn,
-        _ => Severity::Refuse,
-    };
-    let explains = |found: &Finding| {
-        let from = found.code().entry().explains_from;
-        from.is_some_and(|from| found.severity >= from.max(least))
-    };
-    findings.iter().any(explains)
-}
-
-/// Why a log has no calibration, with what the diagnosis found.
-fn failure(error: &FitError, findings: &[Finding]) -> String {
-    let messages = words::paragraph(findings, Severity::Warn);
-    match is_explained(error, findings) {
-        _ if messages.is_empty() => format!("{NOT_WRITTEN}{error}"),
-        true => refused(&messages),
-        false => format!("{NOT_WRITTEN}{error}. {messages}"),
-    }
-}
-
-fn refused(findings: &str) -> String {
-    format!("the log is refused, and no parameter blob was written: {findings}")
-}
-
-/// Why `check` refuses a log; `None` where it does not.
-pub fn check_refusal(fitted: Result<&Fit, &FitError>, findings: &[Finding]) -> Option<String> {
-    let refusals = words::paragraph(findings, Severity::Refuse);
-    match fitted {
-        Err(error) => Some(failure(error, findings)),
-        Ok(_) if refusals.is_empty() => None,
-        Ok(_) => Some(refused(&refusals)),
-    }
 }
 
 /// Why a blob is not of a stage: it was made for other scales of codes; `None` where it may be.
@@ -100,6 +58,7 @@ pub fn other_scales(set: &ParameterSet, stage: &Stage) -> Option<String> {
 pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Diagnosis) -> Group {
     let (rows, movements) = log.dataset.read();
     let fit = fitted.ok();
+    let refusal = Refusal::from_fit(fitted, &diagnosis.findings);
     group! {
         "rows" => rows,
         "judged_rows" => fit.map(|fit| fit.judgement.rows()),
@@ -108,6 +67,7 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
         "model" => fit.map(|fit| fit.model.name),
         "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
         "failure" => json!(fitted.err().map(ToString::to_string)),
+        "refusal" => json!(refusal.as_ref().map(|refusal| WordedRefusal(refusal, &diagnosis.findings))),
         "warnings" => json!(log_warnings(log)),
         "verdict" => json!(diagnosis.verdict),
         "predicted" => json!(diagnosis.predicted),

@@ -4,12 +4,12 @@ use super::log_warnings;
 use crate::report::errors::{errors, pose};
 use crate::report::figure::{Group, figure, group};
 use crate::report::verdict::{End, Subject};
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
 use hallstage_calibration::recalibrate::{
     RecalibrateError, Recalibration, StoredPosterior, recalibrate,
 };
 use hallstage_calibration::words;
-use hallstage_input::finding::Severity;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::update::Change;
@@ -27,7 +27,7 @@ pub struct Updated {
     /// The figures.
     pub figures: Group,
     /// Why it is no good, where the log says so.
-    pub refusal: Option<String>,
+    pub refusal: Option<Refusal>,
 }
 
 impl Updated {
@@ -44,19 +44,24 @@ impl Updated {
     ) -> Result<Self, RecalibrateError> {
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
-        let refusal = words::paragraph(&new.diagnosis.findings, Severity::Refuse);
         Ok(Self {
             figures: figures(change, &new, log, &warnings),
-            refusal: Some(refusal).filter(|refusal| !refusal.is_empty()),
+            refusal: Refusal::from_findings(&new.diagnosis.findings),
             new,
             warnings,
         })
     }
 
+    /// Why it is no good, in words.
+    pub fn refusal_message(&self) -> Option<String> {
+        let refusal = self.refusal.as_ref()?;
+        Some(words::refusal(refusal, &self.new.diagnosis.findings))
+    }
+
     /// What its verdict is about.
     pub fn subject(&self) -> Subject<'_> {
         Subject {
-            end: self.refusal.as_deref().map_or(End::Written, End::Failed),
+            end: self.refusal.as_ref().map_or(End::Written, End::Failed),
             diagnosis: &self.new.diagnosis,
             is_field: true,
             errors: Some(&self.new.judgement.errors),

@@ -3,16 +3,18 @@
 use super::args::{Json, Logs};
 use super::interrupt;
 use super::report::{Report, finish};
-use crate::calibrate::{check_refusal, checked, log_warnings};
+use crate::calibrate::{checked, log_warnings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
 use crate::report::result::{self, Circumstances, Judged};
 use crate::report::verdict::{End, Subject};
 use clap::Args;
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
+use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::ReadOptions;
 use hallstage_solver::solve::{Projection, SolverOptions};
@@ -54,10 +56,10 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         diagnose_log(&log.dataset, &stage, fitted.as_ref())
     });
     let findings = &diagnosis.findings;
-    let why = check_refusal(fitted.as_ref(), findings);
+    let refusal = Refusal::from_fit(fitted.as_ref(), findings);
     let fit = fitted.as_ref().ok();
     let subject = Subject {
-        end: why.as_deref().map_or(End::Checked, End::Failed),
+        end: refusal.as_ref().map_or(End::Checked, End::Failed),
         diagnosis: &diagnosis,
         is_field: fit.is_some_and(|fit| fit.field.is_some()),
         errors: fit.map(|fit| &fit.judgement.errors),
@@ -92,9 +94,12 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         Ok(source)
     })?;
     let is_note = |found: &Finding| found.severity == Severity::Note;
-    if why.is_none() && findings.iter().all(is_note) {
+    if refusal.is_none() && findings.iter().all(is_note) {
         terminal::print("no fault found\n")?;
     }
     finish(outputs, &checked.tables(), &log_warnings(&log), &subject)?;
-    why.map_or(Ok(()), |why| Err(HostError::rejected(why)))
+    match &refusal {
+        Some(refusal) => Err(HostError::rejected(words::refusal(refusal, findings))),
+        None => Ok(()),
+    }
 }

@@ -14,12 +14,13 @@
 use super::interrupt;
 use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
-use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
+use crate::calibrate::{CalibrateError, Mismatch};
 use crate::output::export::ExportError;
 use crate::output::{OutputError, OutputProblem};
 use hallstage_calibration::fit::FitError;
 use hallstage_calibration::plan::PlanError;
 use hallstage_calibration::recalibrate::RecalibrateError;
+use hallstage_calibration::words::NO_FIT;
 use hallstage_input::log::{LogError, LogProblem};
 use hallstage_input::source::SourceProblem::Interrupted;
 use hallstage_simulate::recording::RecordError;
@@ -118,7 +119,7 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
         return (interrupt::EXIT_STATUS, "");
     }
     if error.is::<FitError>() {
-        return (4, NOT_WRITTEN);
+        return (4, NO_FIT);
     }
     if error.is::<PlanError>() {
         return (4, "no run was written: ");

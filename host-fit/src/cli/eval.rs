@@ -84,7 +84,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         &report.warnings,
         &subject,
     )?;
-    match evaluation.refusal() {
+    match evaluation.refusal_message() {
         Some(why) => Err(HostError::rejected(why)),
         None => Ok(()),
     }

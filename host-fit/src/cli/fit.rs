@@ -129,15 +129,15 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let warnings = log_warnings(&log);
     let (Some((fit, report)), true) = (found, outcome.has_blob) else {
         finish(outputs, &[], &warnings, &subject)?;
-        let cause = outcome.refusal.unwrap_or_default();
-        return Err(HostError::rejected(match &outcome.fitted {
-            Ok(_) => {
-                format!("{cause} No parameter blob was written; --force writes one that says so")
-            }
-            Err(_) => cause,
-        }));
+        let cause = outcome.refusal_message().unwrap_or_default();
+        let force = match &outcome.fitted {
+            Ok(_) => "; --force writes one that says so",
+            Err(_) => "",
+        };
+        let cause = format!("{cause} No parameter blob was written{force}.");
+        return Err(HostError::rejected(cause));
     };
-    if let Some(cause) = &outcome.refusal {
+    if let Some(cause) = outcome.refusal_message() {
         terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
     }
     let known = outcome.known();

@@ -76,7 +76,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let details = updated.figures.tables();
     finish(outputs, &details, &updated.warnings, &updated.subject())?;
     updated
-        .refusal
+        .refusal_message()
         .map_or(Ok(()), |why| Err(HostError::rejected(why)))
 }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::report::result::{Circumstances, Judged};
 use crate::report::verdict::End;
 use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_calibration::judge::verdict::Verdict;
@@ -142,13 +143,13 @@ fn the_page_of_a_refused_log_has_its_findings_by_cause() {
         ..Diagnosis::default()
     };
     let dataset = shipped(&stage);
-    let refused = subject(End::Failed("it does not fit"), &diagnosis);
+    let refused = subject(End::Failed(&Refusal::Findings), &diagnosis);
     let source = Source {
         warnings: vec!["a line is cut".to_owned()],
         ..source(&stage, &dataset, refused)
     };
     let page = source.html().expect("a page");
-    assert!(page.contains("Refused</b>: it does not fit"));
+    assert!(page.contains("Refused</b>: The log is refused."));
     // One cause, with the cost of the worst.
     assert_eq!(page.matches("<code>jitter</code>").count(), 1);
     assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));

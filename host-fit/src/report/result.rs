@@ -6,10 +6,11 @@ use super::figure::{Group, Item, bare, figure, group};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
 use super::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::Fit;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Judgement, Zeros};
-use hallstage_calibration::words;
+use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::axis::PROBES;
 use hallstage_input::dataset::{Dataset, Movement};
 use hallstage_input::finding::Finding;
@@ -194,6 +195,12 @@ impl Report {
             by_row: by_row.clone(),
             over_rows,
         }
+    }
+
+    /// Adds why the blob is not to be used: `refusal` with `code` and `message`, or null.
+    pub fn set_refusal(&mut self, refusal: Option<&Refusal>) {
+        let worded = refusal.map(|refusal| WordedRefusal(refusal, &self.findings));
+        self.figures.set("refusal", json!(worded));
     }
 
     /// The report of a fit. Only a fit has:

@@ -4,22 +4,24 @@ use super::figure::{Figure, micro};
 use super::table::Table;
 use super::text::as_text;
 use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::judge::predicted::{Predicted, Validity};
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
+use hallstage_calibration::words;
 use hallstage_input::axis::PLANAR;
 use hallstage_input::finding::Severity;
 use serde::Serialize;
 
 /// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End<'a> {
     /// With a parameter blob.
     Written,
     /// With the best so far in the blob; the log was not diagnosed.
     Interrupted,
     /// Without a blob, or with errors beyond the limit, for this reason.
-    Failed(&'a str),
+    Failed(&'a Refusal),
     /// A blob was judged on the log.
     Judged,
     /// The log was looked at, and nothing was kept.
@@ -105,7 +107,7 @@ impl Summary {
 /// What the verdict means.
 fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
     match (of.end, predicted) {
-        (End::Failed(why), _) => why.to_owned(),
+        (End::Failed(refusal), _) => words::refusal(refusal, &of.diagnosis.findings),
         (_, Some(predicted)) if of.is_field => {
             let ratio = predicted.worst_ratio();
             let repaired = match of.diagnosis.repair {
@@ -231,7 +233,7 @@ mod tests {
         let diagnosis = Diagnosis {
             findings: vec![Finding::new(Kind::Hum {
                 frequency_hz: 50.0,
-                amplitude_m: 1e-6,
+                amplitude_um: 1.0,
             })],
             verdict,
             predicted: Some(PREDICTED),
@@ -255,7 +257,8 @@ mod tests {
     fn the_end_of_the_run_and_the_verdict_decide_what_is_said_first() {
         use Verdict::{Good, Limited, Refused};
         let (good, limited, refused) = (Some(Good), Some(Limited), Some(Refused));
-        let failed = End::Failed("no motion");
+        let failed = &Refusal::Unfinished { over_noise: 7.0 };
+        let failed = End::Failed(failed);
         for (end, verdict, is_field, [mark, sentence, next]) in [
             (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
             (End::Written, good, true, ["good", "within 0.3 K", "eval"]),
@@ -268,7 +271,7 @@ mod tests {
             ),
             (End::Written, limited, false, ["limited", "µm in X", "plan"]),
             (End::Written, refused, true, ["refused", "1.20", "fit eval"]),
-            (failed, good, true, ["refused", "no motion", ""]),
+            (failed, good, true, ["refused", "7.0 times the noise", ""]),
             (End::Interrupted, good, true, ["limited", "1.20", ""]),
             (End::Judged, None, true, ["limited", "1.20 times", ""]),
         ] {

@@ -78,7 +78,7 @@ fn a_fit_beyond_its_limits_is_not_written_without_force() {
         &format!("{fit} x=1nm,rz=1mrad"),
         4,
         &[
-            "the errors on the log are beyond --limit: x 0.9",
+            "The errors on the log are beyond --limit: x 0.9",
             "No parameter blob was written",
         ],
     );
@@ -184,7 +184,7 @@ fn eval_judges_a_blob_by_its_own_errors() {
     bench.good("fit log.csv --out p.bin");
     bench.good("eval p.bin log.csv");
     let parts = [
-        "more than 10 times",
+        "more than 10 (--limit)",
         "fits if the sign of Hall A is inverted",
     ];
     bench.bad("eval p.bin turned.csv --json e.json", 4, &parts);
@@ -196,7 +196,7 @@ fn eval_judges_a_blob_by_its_own_errors() {
     bench.bad(
         "eval p.bin log.csv --limit 0.9",
         4,
-        &["more than 0.9 times"],
+        &["more than 0.9 (--limit)"],
     );
     bench.bad("eval p.bin log.csv --limit 0", 2, &["above zero"]);
 }

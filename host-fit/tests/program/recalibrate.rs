@@ -132,7 +132,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     std::fs::remove_file(bench.path("repaired.bin.posterior")).expect("removed");
     assert!(stdout(&bench.good("inspect repaired.bin")).contains(line));
     let fit = "fit new.csv --out other.bin --limit y=0.2um";
-    let words = "the errors in service are beyond --limit: y 0.4";
+    let words = "The errors in service are beyond --limit: y 0.4";
     bench.bad(fit, 4, &[words]);
 }
 

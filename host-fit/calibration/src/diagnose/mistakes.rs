@@ -1,14 +1,13 @@
-//! What labs mix up between stage, wires, log and `stage.toml`, as the linear change of the rows that sets it
-//! right.
+//! Mistakes of labs with stage, wires, log and `stage.toml`, as linear changes of the rows that set them right.
 
-use super::bank::UNDECIDED;
+use super::limits::UNDECIDED;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Cause, Code, Correction};
 use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
 
-/// What is done to the rows: each matrix times its three numbers. Hall signals, reference, vertical pose.
+/// A change of the rows: matrices for the three Hall signals, the reference and the vertical pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change(pub(super) [Matrix3<f64>; 3]);
 
@@ -28,21 +27,22 @@ impl Change {
 #[derive(Clone, Debug)]
 pub(super) struct Mistake {
     pub(super) code: Code,
-    /// What sets the log right, but for the value.
+    /// What sets the log right, without its value.
     pub(super) correction: Correction,
     /// The factor of a scale, or how far something is turned, degrees.
     pub(super) value: Option<f64>,
-    /// What a value that may be any costs: twice the logarithm of the odds.
+    /// The cost of an unusual value: twice the logarithm of its odds.
     pub(super) penalty: f64,
-    /// Whether other magnets than designed show the same.
+    /// Whether other magnets than designed have the same effect.
     pub(super) may_be_magnets: bool,
     pub(super) change: Change,
 }
 
-/// Factors to a power of ten that are tried, and the largest power: units of um and m.
+/// Factors per decade that are tried.
 const FACTORS: i32 = 24;
+/// Decades of factors: units may be um for m.
 const POWERS: i32 = 6;
-/// Turns that are tried, degrees.
+/// Step of the turns that are tried, degrees.
 const TURN_DEG: i32 = 10;
 
 /// The codes of an exchange and of a sign: of Hall probes, beams and gaps.
@@ -52,7 +52,7 @@ const SIDES: [[Code; 2]; 3] = [
     [Code::CapacitiveSwapped, Code::CapacitiveInverted],
 ];
 
-/// All mistakes with order, sign, scale and place; of the gaps those that codes can have.
+/// All mistakes with order, sign, scale and place; mistakes with gaps only if the log has codes.
 pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     let half_m = 0.5 * stage.y_baseline_m;
     let beams = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, half_m, 0.0, 1.0, -half_m);
@@ -95,7 +95,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             out.push(mistake(inverted, Correction::Sign(named), times(-1.0)));
         }
     }
-    // Rz of the reference, and Rx and Ry, are so many times larger.
+    // Rz of the reference, and Rx and Ry, are multiplied.
     let turned = |rz: f64, tilts: f64| {
         let diagonals = [[1.0; 3], [1.0, 1.0, rz], [1.0, tilts, tilts]];
         Change(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
@@ -139,12 +139,12 @@ fn scales(out: &mut Vec<Mistake>, correction: &Correction, change: impl Fn(f64) 
     );
 }
 
-/// Any factor is less likely than two, a half or a power of ten, any turn less than a right angle.
+/// Factors of two, a half and powers of ten, and right angles, are more likely than others.
 const fn penalty(is_usual: bool) -> f64 {
     if is_usual { 0.0 } else { UNDECIDED }
 }
 
-/// Sensors that stand elsewhere than `stage.toml` says.
+/// Sensors at other places than in `stage.toml`.
 fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     let designed = stage.capacitive_probes_m;
     let mut add = |correction, value, penalty, places: ProbePositions<f64>| {
@@ -190,7 +190,7 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     }
 }
 
-/// What sets the log right: the first of mistakes that differ by a value, with the range of their values.
+/// The cause from mistakes that differ only in their value, the best first.
 pub(super) fn cause(alike: &[&Mistake]) -> Cause {
     let first = alike[0];
     let values = || alike.iter().filter_map(|mistake| mistake.value);

@@ -1,15 +1,17 @@
-//! What is wrong with a log, and by how much it can be trusted: between the fit and the blob.
+//! The faults of a log, their cost in service, and the verdict on the calibration.
 //!
 //! | module | what it does |
 //! |---|---|
-//! | `mistakes` | what labs mix up: order, signs, scales, places |
-//! | [`structure`] | which of them alone explains a log |
-//! | [`bank`] | faults of channels, logs or parts of one that contradict each other, with their cost |
+//! | [`signals`] | faults in the signals: missing rows, channels that stand still, outliers, hum |
+//! | [`faults`] | faults of channels by score tests, with their cost and their repair |
+//! | `mistakes` | mistakes with order, signs, scales and places |
+//! | [`structure`] | the mistake that explains a log |
+//! | [`fit_checks`] | findings about the fit itself |
 //! | [`range`] | poses beyond the range of a calibration |
-//! | [`of_fit`] | what a fit says of itself |
-//! | [`signals`] | what the signals show by themselves |
-//! | `slopes` | how an error of each channel shows in the Hall signals |
-//! | [`temperature`] | k and h, a drift of temperature, how far a calibration is good |
+//! | [`temperature`] | findings about temperature |
+//! | [`refusal`] | why a calibration is not to be used |
+//! | `slopes` | the effect of an error of each channel on the Hall signals |
+//! | `limits` | the limits that these tests share |
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -29,10 +31,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod bank;
+pub mod faults;
+pub mod fit_checks;
+mod limits;
 mod mistakes;
-pub mod of_fit;
 pub mod range;
+pub mod refusal;
+#[cfg(test)]
+mod search_tests;
 pub mod signals;
 mod slopes;
 pub mod structure;
@@ -44,25 +50,29 @@ use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused, severity};
-use bank::Fitted;
+use faults::{Calibrated, Faults, find_faults};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::FieldParameters;
+pub use limits::ERROR_TO_NOISE_MAX;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
 
-/// What is wrong with a log, and what a calibration is good for.
+/// A fit with this many times the errors of the best fit is poor.
+const POOR_MIN: f64 = 1.5;
+
+/// The faults of a log, and the verdict on its calibration.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnosis {
-    /// What is wrong, the most severe first.
+    /// The findings, the most severe first.
     pub findings: Vec<Finding>,
     /// Whether the calibration can be used; `None` for a blob where the log cannot predict its errors.
     pub verdict: Option<Verdict>,
     /// The errors to expect in service; `None` where the log is too short or too still to predict them.
     pub predicted: Option<Predicted>,
-    /// The parameters without the faults of the log, for which the verdict is: see [`Fit::repaired`].
+    /// The parameters without the faults of the log: see [`Fit::repaired`]. The verdict is about them.
     pub repair: Option<Repair>,
     /// How far from the temperature of the log a calibration by the field model is good.
     pub validity: Option<Validity>,
@@ -85,17 +95,16 @@ pub fn diagnose_log(
         outliers => Cow::Owned(dataset.without(outliers)),
     };
     let own = Described::by_fit(fitted, stage);
-    let best = fitted
-        .ok()
-        .and_then(|fit| Described::better(fit, dataset, stage));
-    let best = best.unwrap_or(own);
+    let better = fitted.ok();
+    let better = better.and_then(|fit| Described::better(fit, dataset, stage));
+    let (best, poor) = better.map_or((own, None), |(best, poor)| (best, Some(poor)));
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
-    let by = Fitted {
+    let by = Calibrated {
         parameters: &own.parameters,
         start: &best.parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
-        for_service: field.is_some_and(|field| !field.comparison.by_resets),
-        is_to_rows: fitted.is_ok(),
+        is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
+        is_fitted: fitted.is_ok(),
     };
     let mut out = Diagnosis::default();
     // A log that determines no parameters shows nothing of its channels.
@@ -110,13 +119,14 @@ pub fn diagnose_log(
         (by, best.lag_s),
         is_described,
     );
+    out.findings.extend(poor);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
         Err(_) => out.predicted = None,
     }
-    let short = of_fit::short_movements(fitted.ok(), dataset);
+    let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
-    let is_for_service = by.for_service;
+    let is_for_service = by.is_for_service;
     let basis = match fitted {
         Ok(_) => Basis::Fit { is_for_service },
         Err(_) => Basis::NoFit,
@@ -137,7 +147,7 @@ pub fn diagnose_log(
     out
 }
 
-/// What predicts the signals of a log.
+/// Parameters and lag that predict the signals of a log.
 #[derive(Clone, Copy, Debug)]
 struct Described {
     parameters: FieldParameters,
@@ -165,16 +175,18 @@ impl Described {
         }
     }
 
-    /// The best description of the log where this fit is a poor one, as of a search that has not converged: the
-    /// signals show no fault of their own there.
-    fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<Self> {
-        let over_noise = of_fit::over_noise(poor, dataset);
-        if poor.field.is_some() || over_noise <= of_fit::ERROR_TO_NOISE_MAX {
+    /// The best description of the log by the same model where this fit is poor, because a search has not converged,
+    /// and a finding about that. Signals are judged by the best description.
+    fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<(Self, Finding)> {
+        let over_noise = fit_checks::over_noise(poor, dataset);
+        if poor.field.is_some() || over_noise <= ERROR_TO_NOISE_MAX {
             return None;
         }
-        let best = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto)).ok()?;
-        let is_better = of_fit::over_noise(&best, best.rows(dataset)) < over_noise;
-        is_better.then(|| Self::by_fit(Ok(&best), stage))
+        let model = ModelChoice::Named(poor.model);
+        let best_fit = fit(dataset, stage, &FitSettings::new(model)).ok()?;
+        let best = fit_checks::over_noise(&best_fit, best_fit.rows(dataset));
+        let found = Finding::new(Kind::PoorFit { over_noise, best });
+        (POOR_MIN * best < over_noise).then(|| (Self::by_fit(Ok(&best_fit), stage), found))
     }
 }
 
@@ -182,7 +194,7 @@ fn are_notes(findings: &[Finding]) -> bool {
     findings.iter().all(|f| f.severity == Severity::Note)
 }
 
-/// Whether the rows of a finding are left out, so that the calibration can be free of it.
+/// Whether the rows of a finding are left out of a repair.
 const fn stands(found: &Finding) -> bool {
     matches!(found.code(), Code::Stuck | Code::Saturated)
 }
@@ -195,18 +207,17 @@ impl Diagnosis {
         dataset: &Dataset,
         without_outliers: &Dataset,
         stage: &Stage,
-        (by, lag_s): (Fitted, f64),
+        (by, lag_s): (Calibrated, f64),
         is_described: bool,
     ) {
         let (findings, bad) = signals::signal_findings(dataset, stage, (by.start, lag_s));
         self.findings = findings;
-        // Rows that jump are for the loss of the fit.
         let is_bent = self.findings.iter().any(stands);
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
-        let rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by, is_bent));
+        let rows = has_channels.then(|| find_faults(&dataset.without(&bad), stage, by, is_bent));
         let of_rows = rows.flatten();
-        // A fault whose repair leaves no more than noise explains what a mistake would.
-        let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
+        // A repair that leads to residuals of noise explains the log; no mistake is needed.
+        let explains = |of: &Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
         if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
             let parts = |found: &Finding| found.code() == Code::LogsDisagree;
             let disagree = of_rows
@@ -220,14 +231,14 @@ impl Diagnosis {
         if is_refused(&self.findings) {
             return;
         }
-        if of.rest > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
-            // Of other models it is what they lack.
+        if of.residual > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
+            // Other models lack terms.
             let cost = of.predicted.map_or(1.0, |of| of.worst_ratio());
             let severity = match by.model {
                 ModelKind::Field => severity(cost).max(Severity::Warn),
                 _ => Severity::Refuse,
             };
-            let found = Finding::new(Kind::Inconsistent { ratio: of.rest });
+            let found = Finding::new(Kind::Inconsistent { ratio: of.residual });
             of.findings
                 .push(found.with_severity(severity).with_cost(cost));
         }
@@ -242,14 +253,14 @@ impl Diagnosis {
         self.findings.extend(of.findings);
     }
 
-    /// Adds what only the fit shows, where no fault explains it.
+    /// Adds the findings about the fit that no fault explains.
     fn add_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
         let findings = &mut self.findings;
         // A fault explains the rows that are left out.
         if self.repair.is_none() {
-            findings.extend(of_fit::left_out(fit, dataset));
+            findings.extend(fit_checks::left_out(fit, dataset));
         }
-        // One beam that is late is a lag of all of them to a fit.
+        // A fit takes one late beam for a lag of all beams.
         let is_late = findings
             .iter()
             .any(|found| found.code() == Code::ReferenceLag);
@@ -263,9 +274,13 @@ impl Diagnosis {
                 || found.code().entry().explains_from == Some(Severity::Note)
         };
         if !findings.iter().any(explains) {
-            findings.extend(of_fit::undescribed(fit, dataset, stage));
-            let unexplained = are_notes(findings).then(|| of_fit::over_noise(fit, dataset));
-            findings.extend(of_fit::not_field(fit, self.predicted.as_ref(), unexplained));
+            findings.extend(fit_checks::undescribed(fit, dataset, stage));
+            let unexplained = are_notes(findings).then(|| fit_checks::over_noise(fit, dataset));
+            findings.extend(fit_checks::not_field(
+                fit,
+                self.predicted.as_ref(),
+                unexplained,
+            ));
         }
     }
 
@@ -280,7 +295,7 @@ impl Diagnosis {
     }
 }
 
-/// How a blob came to the log on which it is diagnosed.
+/// The relation of a blob to the log of its diagnosis.
 #[derive(Clone, Copy, Debug)]
 pub enum BlobUse {
     /// It was recalibrated by the log, with these errors to expect in service.
@@ -292,7 +307,7 @@ pub enum BlobUse {
     },
 }
 
-/// The diagnosis of a log on which a blob is judged.
+/// The diagnosis of a log that a blob is judged by.
 pub fn diagnose_blob(
     dataset: &Dataset,
     stage: &Stage,
@@ -304,7 +319,7 @@ pub fn diagnose_blob(
     let of_31 = || FieldParameters::from_model_31(&Parameters::from_set(set), stage);
     let is_for_service = of_field.is_some();
     let parameters = &of_field.unwrap_or_else(of_31);
-    let by = Fitted {
+    let by = Calibrated {
         parameters,
         start: parameters,
         model: if is_for_service {
@@ -312,8 +327,8 @@ pub fn diagnose_blob(
         } else {
             set.model
         },
-        for_service: is_for_service,
-        is_to_rows: false,
+        is_for_service,
+        is_fitted: false,
     };
     let mut out = Diagnosis::default();
     out.add_faults(dataset, dataset, stage, (by, 0.0), true);

@@ -1,5 +1,6 @@
 //! Poses beyond the range of a calibration, and motion that is not the declared one.
 
+use super::limits::SPANS;
 use crate::fit::{Fit, RANGE_MARGIN};
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::{Dataset, Row};
@@ -7,10 +8,8 @@ use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 
-/// An axis that moves by more than this times its declared range, or less than that, has another scale or
-/// moves otherwise: no log shows a scale that is common to all channels of a kind.
-pub(super) const SPANS: (f64, f64) = (0.1, 2.0);
-/// The field model is less good than predicted beyond a log that moves an axis by less than this part.
+/// The errors of the field model are larger than predicted if the log moves an axis by less than this part of its
+/// declared range.
 const RANGE_MIN: f64 = 0.5;
 
 /// X, Y, Rz, Z, Rx, Ry: m, rad.
@@ -40,7 +39,7 @@ pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Findi
     })
 }
 
-/// The rows whose pose leaves the range in which a blob was calibrated.
+/// Rows with a pose beyond the calibrated range of a blob.
 pub fn out_of_range(set: &ParameterSet, dataset: &Dataset) -> Option<Finding> {
     let constants = &set.constants;
     let range = [constants.calibrated_planar, constants.calibrated_vertical].concat();

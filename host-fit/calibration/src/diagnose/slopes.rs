@@ -1,11 +1,11 @@
-//! How an error of each channel shows in the Hall signals.
+//! The effect of an error of each channel on the Hall signals.
 
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::probe::Probe;
 use nalgebra::{Matrix3, Vector3};
 use runtime::capacitive::vertical_per_gap;
 
-/// The probes, and the poses that errors of the reference and of the gaps make.
+/// The probes, and the changes of the pose by errors of the beams and the gaps.
 pub(super) struct Slopes {
     probes: [Probe; 3],
     /// X, Y, Rz (mm, mm, mrad) by an error of each beam, mm.
@@ -17,7 +17,7 @@ pub(super) struct Slopes {
 impl Slopes {
     pub(super) fn new(stage: &Stage, probes: [Probe; 3]) -> Self {
         let turn = 1.0 / stage.y_baseline_m;
-        // A checked stage has its sensors apart.
+        // The sensors of a checked stage do not stand on one line.
         let per_gap = vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default();
         Self {
             probes,

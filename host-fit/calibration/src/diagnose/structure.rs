@@ -1,15 +1,12 @@
-//! What is mixed up between stage, wires, log and `stage.toml`: order, signs and scales of channels, places of
-//! sensors.
+//! Mistakes between stage, wires, log and `stage.toml`: order, signs and scales of channels, places of sensors.
 //!
-//! Every such mistake is a linear change of the Hall signals, of the reference or of the vertical pose, and a
-//! probe fitted by itself absorbs it: its residual stays that of a sound log. What gives the mistake away is
-//! where the parameters end up. So each probe is fitted once, and a mistake undone is a change of its
-//! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
-//! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
+//! Every such mistake is a linear change of the Hall signals, of the reference or of the vertical pose. A probe that is
+//! fitted by itself absorbs it without a larger residual, but its parameters come out wrong. So each probe is fitted
+//! once, and a mistake that is set right is a change of its parameters. Then its direction, lever arm and sensitivity
+//! must agree with the drawing, and the sensitivity must fall with the height at its place: b/a = y and c/a = -x.
 
-use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
+use super::limits::{MEANS_MAX, RARITY, ROUNDS, SPANS, UNDECIDED};
 use super::mistakes::{Change, Mistake, cause, mistakes};
-use super::range::SPANS;
 use crate::judge::identify::check_motion;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
@@ -24,14 +21,16 @@ use runtime::ModelKind;
 /// For how long a model errs alike, s: its errors go with the motion. What it leaves unexplained
 /// counts as one residual in that time.
 const ALIKE_S: f64 = 0.5;
-/// Gain and its slopes, how far height and tilts carry the probe, and what lags of the beams do.
+/// Unknowns of a probe: gains and their slopes, the shift of the probe by height and tilts, and the lags of the beams.
 const UNKNOWNS: usize = 12;
 
-/// Tolerances, standard deviations, up to twice those of simulated stages: of the logarithm of eta (where
-/// `stage.toml` has a range of it, that of any value within), of theta, of a lever arm (m), of a/eta (1/mm), and
-/// of b/eta and c/eta, which show the place of a probe within 40 mm (1/mrad).
+/// Tolerances, standard deviations, up to twice the spread of simulated stages: of the logarithm of eta (replaced by
+/// its range in `stage.toml`), of theta, of a lever arm (m), of a/eta (1/mm), and of b/eta and c/eta (1/mrad), which
+/// show the place of a probe within 40 mm.
 const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
-/// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more.
+/// Precision of a weak prior over the residual's, mm and mrad: unknowns that the log does not show stay finite.
+const WEAK: f64 = 0.01;
+/// Sum of squared distances over tolerances of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
 
 type Vector = SVector<f64, 6>;
@@ -44,9 +43,8 @@ struct Fitted {
     covariance: Covariance,
 }
 
-/// What keeps a log from being that of the designed stage, if anything does; `None` of a log in which nothing
-/// moves. Where its parts `disagree`, which a mistake may cause, too, one needs less to be likely, and is a
-/// warning beside that.
+/// The mistake that explains a log of another stage than designed, if there is one; `None` for a log without motion.
+/// A mistake can also make parts of the log `disagree`: then weaker evidence is a warning.
 pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Finding> {
     let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
@@ -56,7 +54,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let as_logged = distance(&Change::nothing());
     let mut rows = dataset.rows.iter();
     let mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
-    // Chance alone makes no distance so much smaller by one of them undone.
+    // Chance does not lower the distance by more than this.
     let usual = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
     let sure = 2.0 * libm::log(RARITY * usual.count() as f64);
     let likely = if disagree { UNDECIDED } else { sure };
@@ -64,7 +62,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
         return None;
     }
     let spans = spans(dataset);
-    // The declared motion tells apart what the geometry does not.
+    // The declared motion separates mistakes that the geometry cannot.
     let rank = |mistake: Mistake| {
         let of_motion = beyond_motion(stage, &spans, &mistake.change);
         (
@@ -122,7 +120,7 @@ fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
     }
 }
 
-/// What the drawing says of the probes: one of each in its turn.
+/// The probes in the drawing.
 struct Drawing {
     eta: [f64; 3],
     theta: [f64; 3],
@@ -148,7 +146,7 @@ impl Drawing {
         }
     }
 
-    /// How far a probe is from where the drawing has it.
+    /// The differences of a fitted probe from the drawing.
     fn features(&self, probe: usize, at: &Vector) -> Vector {
         let [x, y, turn, a, b, c] = (*at).into();
         // A and B sense Y, C senses X.
@@ -169,7 +167,7 @@ impl Drawing {
         ])
     }
 
-    /// Squares of the distances in terms of tolerances and of what the log leaves open, of three probes.
+    /// Sum of squared differences of three probes over tolerances and uncertainties of the fit.
     fn distance(&self, fitted: &[Fitted; 3], change: &Change) -> f64 {
         let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
         let all = (0..3).map(|probe| of_probe(probe).unwrap_or(f64::INFINITY));
@@ -200,8 +198,8 @@ impl Drawing {
     }
 }
 
-/// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. What this
-/// leaves goes with the motion.
+/// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. The
+/// residuals follow the motion, so neighbours are alike.
 fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let rows = Rows::new(dataset, &all);
@@ -233,8 +231,7 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
             }
             let rest = products[(UNKNOWNS, UNKNOWNS)] / count;
             let mut own = products.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
-            // What the log does not show has any value, in mm and mrad.
-            let open = (NOTHING * rest).max(f64::MIN_POSITIVE);
+            let open = (WEAK * rest).max(f64::MIN_POSITIVE);
             own += SMatrix::from_diagonal_element(open);
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
@@ -249,7 +246,7 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
     Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
 }
 
-/// Root mean squares of the reference and of the vertical pose, as matrices of products: m2, rad2.
+/// Mean products of the axes of the reference and of the vertical pose: m2, rad2.
 fn spans(dataset: &Dataset) -> [Matrix3<f64>; 2] {
     let mut sums = [Matrix3::zeros(); 2];
     for row in &dataset.rows {
@@ -261,18 +258,18 @@ fn spans(dataset: &Dataset) -> [Matrix3<f64>; 2] {
     sums.map(|sum| sum / dataset.rows.len().max(1) as f64)
 }
 
-/// How far the motion with a mistake undone is from the declared one.
+/// The penalty for a correction that makes the motion much larger or smaller than declared.
 fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f64 {
     let mut sum = 0.0;
     for (half, by) in change.0[1..].iter().enumerate() {
         let products = by * spans[half] * by.transpose();
         for axis in 0..3 {
             let service = stage.motion.axes[3 * half + axis].service;
-            // A sine within the range has 0.7 times its rms.
+            // The rms of a sine is 0.71 of its range.
             let part = products[(axis, axis)].max(0.0).sqrt() * std::f64::consts::SQRT_2 / service;
             let log = libm::log(part.max(f64::MIN_POSITIVE));
             let beyond = f64::max(log - libm::log(SPANS.1), libm::log(SPANS.0) - log).max(0.0);
-            // Twice as far makes the odds those of an undecided cause.
+            // A factor of two beyond costs as much as an undecided cause.
             sum += UNDECIDED * (beyond.min(20.0) / std::f64::consts::LN_2).powi(2);
         }
     }

@@ -1,4 +1,4 @@
-//! Every mistake is named by itself, or beside what a log cannot tell it from.
+//! Every mistake is named, with all mistakes that a log cannot separate from it.
 
 use super::structure::structure;
 use crate::words::message;
@@ -34,7 +34,7 @@ fn a_sound_log_is_that_of_its_stage() {
     }
 }
 
-/// Two seconds show little, and what the simple form lacks goes with the motion.
+/// Two seconds show little, and the residuals of the simple form follow the motion.
 #[test]
 fn a_short_sound_log_has_no_mistake() {
     let stage = stage("", "");

@@ -1,5 +1,5 @@
-//! What a calibration knows of temperature: k and h, what a drift in the log costs, how far from the
-//! temperature of its log it is good, and when to zero again.
+//! Findings about temperature: k and h, the cost of a drift in the log, rows without a temperature, and when to zero
+//! again.
 
 use crate::fit::Fit;
 use crate::judge::predicted::declared_service;
@@ -14,17 +14,16 @@ use nalgebra::DMatrix;
 use runtime::Temperature;
 use runtime::real::Real;
 
-/// Offsets of Hall elements and the expansion of the stage move its zero. After such a change, K, the
-/// stage is zeroed again.
+/// The stage is zeroed again after a change of this many kelvin: offsets of Hall elements and expansion move its zero.
 const REZERO_K: f64 = 5.0;
 
-/// A coefficient this many standard deviations from what the stage file expects has another cause.
+/// A coefficient is wrong if it is this many standard deviations from the value in the stage file.
 const DEVIATIONS_MAX: f64 = 4.0;
-/// Rows without a temperature, in parts of all, that k and h can bear.
+/// Largest share of rows without a temperature with which k and h can be fitted.
 const MISSING_MAX: f64 = 0.01;
 
-/// What a fit found of k and h, a finding for each sensor. Its cost is that of the temperature's drift in
-/// the log, of which k and h leave a part.
+/// The fitted k and h, a finding for each sensor. The cost is the error in service from the drift of the temperature in
+/// the log and the uncertainty of k and h.
 pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
     let temperature = &fit.calibration.temperature;
     let parameters = fit.estimate.parameters;
@@ -80,7 +79,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
             Some(cost) => found.with_severity(severity(cost)).with_cost(cost),
             None => found,
         };
-        // Wrong at any other temperature.
+        // The calibration is wrong at any other temperature.
         match is_other {
             true => found.with_severity(Severity::Refuse),
             false => found,
@@ -96,7 +95,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
     there.map(finding).chain(incomplete).collect()
 }
 
-/// Rows without a temperature that the calibration needs, or with one too far from T0 to be true.
+/// Rows without a temperature that the calibration needs, or with a temperature too far from T0 to be true.
 pub(super) fn missing<T: Real>(temperature: &Temperature<T>, dataset: &Dataset) -> Option<Finding> {
     let mut rows =
         (dataset.rows.iter()).filter(|row| !temperature.is_plausible(row.frame.temperature_mc()));
@@ -128,8 +127,8 @@ fn drift_k(dataset: &Dataset, temperature: &Temperature<f64>, sensor: usize) -> 
     (squares / dataset.rows.len().max(1) as f64).sqrt()
 }
 
-/// That the temperature changed, in a log that a blob is judged on, by more than a zero holds: since the
-/// begin of a movement if its zero deviation is `refitted`, else since the calibration.
+/// A change of the temperature after which a stage is zeroed again: since the begin of a movement if its zero deviation
+/// is `refitted`, else since the calibration.
 pub fn rezero(
     temperature: &Temperature<f32>,
     dataset: &Dataset,

@@ -19,16 +19,16 @@ const LAG_ERRORS_MIN: f64 = 3.0;
 /// In a million rows of noise alone the largest error is five times the rms.
 const PEAK_TO_RMS_MAX: f64 = 8.0;
 
-/// Movements with a zero deviation beyond its range, and rows that the decoder refuses.
+/// Zero deviations beyond their range, and rows that the decoder refuses.
 pub fn counted(zeros: &[ZeroDeviation], undecoded: usize) -> impl Iterator<Item = Finding> {
     let movements = zeros.iter().filter(|zero| zero.is_beyond).count();
     let deltas = zeros.iter().flat_map(|zero| zero.delta_m);
-    let largest_m = deltas.fold(0.0, |most: f64, delta| most.max(delta.abs()));
+    let largest_um = 1e6 * deltas.fold(0.0, |most: f64, delta| most.max(delta.abs()));
     let of = zeros.len();
     let clipped = Kind::ZerosClipped {
         movements,
         of,
-        largest_m,
+        largest_um,
     };
     let clipped = (movements > 0).then(|| Finding::new(clipped));
     clipped.into_iter().chain(codes_refused(undecoded))
@@ -44,7 +44,8 @@ pub(super) fn late_reference(lag: &ReferenceLag, period_s: f64) -> Option<Findin
     let lag_s = lag.value_s;
     let least = (LAG_MIN * period_s).max(LAG_ERRORS_MIN * lag.standard_error_s);
     let periods = lag_s / period_s;
-    let kind = Kind::LateReference { lag_s, periods };
+    let lag_us = lag_s * 1e6;
+    let kind = Kind::LateReference { lag_us, periods };
     (lag_s.abs() > least).then(|| Finding::new(kind).with_channel(Channel::Beams))
 }
 

@@ -12,7 +12,7 @@ use runtime::Temperature;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
-/// One of twenty stages is below the range of predicted errors, one above it: standard deviations.
+/// Ends of the range of predicted errors, standard deviations: one stage of twenty is below, one above.
 const RANGE_END: f64 = 1.645;
 /// The mean squared error of one calibration differs between services within the declared range: standard
 /// deviation over mean.
@@ -24,7 +24,7 @@ pub fn declared_service(
     parameters: &FieldParameters,
     white_mm: [f64; 3],
 ) -> Option<Service> {
-    // A sine has the rms 0.71 of its range if it begins anywhere, evenly spread poses 0.58 of theirs.
+    // The motion of service has an rms of half its range, evenly spread poses 0.58 of theirs.
     let most = |axis: usize| 0.75f64.sqrt() * stage.motion.axes[axis].service;
     let poses = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
     Service::new(parameters, white_mm, poses)
@@ -35,14 +35,14 @@ pub fn declared_service(
 pub struct Predicted {
     /// rms: m, m, rad.
     pub rms: [f64; 3],
-    /// The same over the noise floor, which is that of the probes.
+    /// The same over the noise floor from the probes.
     pub ratio: [f64; 3],
-    /// Nine of ten stages with such a log have an rms between these: m, m, rad.
+    /// Nine stages of ten with such a log have an rms in this range: m, m, rad.
     pub range: [[f64; 2]; 3],
 }
 
 impl Predicted {
-    /// Of parameters that are `off` the best estimate, which has this covariance.
+    /// For parameters that differ by `off` from the best estimate, with the covariance of the estimate.
     pub fn new(service: &Service, covariance: &DMatrix<f64>, off: &[f64]) -> Self {
         let variance = service.variance(covariance);
         let known = service.squares(off);
@@ -72,10 +72,9 @@ impl Predicted {
 /// How far from the temperature of its log a calibration is good; all parts change alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Validity {
-    /// Errors at work are at most [`GOOD_MAX`] times the noise floor within this distance, K.
+    /// Errors in service are at most [`GOOD_MAX`] times the noise floor within this distance, K.
     pub within_k: f64,
-    /// Whether the calibration follows temperature; without sensors the distance is an estimate by what is
-    /// known of the parts.
+    /// Whether the calibration follows temperature. Without sensors the distance is an estimate from the stage file.
     pub is_followed: bool,
 }
 
@@ -110,7 +109,7 @@ impl Validity {
         if is_good(bad) {
             good = bad;
         }
-        // To a hundredth of a kelvin.
+        // Bisection to a hundredth of a kelvin.
         for _ in 0..12 {
             let middle = 0.5 * (good + bad);
             if is_good(middle) {
@@ -126,8 +125,8 @@ impl Validity {
     }
 }
 
-/// The quantile, this many standard deviations from the middle, of a sum of squares with this mean and
-/// variance: as of a chi-square with as many degrees of freedom, by Wilson and Hilferty.
+/// The quantile at this many standard deviations of a sum of squares with this mean and variance, as a scaled
+/// chi-square (Wilson and Hilferty 1931).
 pub(crate) fn quantile(mean: f64, variance: f64, deviations: f64) -> f64 {
     if mean <= 0.0 {
         return 0.0;
@@ -178,7 +177,6 @@ mod tests {
     use hallstage_input::shipped::STAGE_TOML;
     use hallstage_solver::estimator::paper::Parameters;
 
-    /// StoredPosterior exactly but for k, a stage is good while the error of k allows.
     #[test]
     fn a_calibration_is_good_while_k_is_known_well_enough() {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
@@ -196,7 +194,7 @@ mod tests {
         let (rough, fine) = (within(3e-4), within(1e-4));
         assert!((fine / rough - 3.0).abs() < 0.05, "{rough} {fine}");
         assert_eq!(within(0.0), 30.0);
-        // At that distance the gain is off by as much as makes the errors so large.
+        // At that distance the error of the gain makes errors of the limit.
         let service = declared_service(&stage, &parameters, white_mm).expect("a service");
         let mut covariance = DMatrix::zeros(COUNT, COUNT);
         for probe in 0..3 {

@@ -5,11 +5,11 @@ use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Code, Finding, Kind, Severity, Trust};
 use serde::Serialize;
 
-/// Predicted errors in service over the noise floor up to which a fault is a note.
+/// Largest predicted errors in service over the noise floor for a note.
 const NOTE_MAX: f64 = 1.05;
-/// Predicted errors in service over the noise floor up to which a calibration is good.
+/// Largest predicted errors in service over the noise floor for the verdict good.
 pub const GOOD_MAX: f64 = 1.10;
-/// Predicted errors in service over the noise floor up to which a calibration is of use at all.
+/// Largest predicted errors in service over the noise floor for the verdict limited.
 pub const LIMITED_MAX: f64 = 1.30;
 
 /// The severity of a fault that makes these errors in service, over the noise floor.
@@ -27,13 +27,13 @@ pub fn severity(ratio: f64) -> Severity {
 pub enum Verdict {
     /// Its errors in service are the noise of the sensors.
     Good,
-    /// Its errors in service are larger, or it is of use on movements like those of the log only.
+    /// Its errors in service are larger, or it is for movements like the log's only.
     Limited,
     /// It is not to be used.
     Refused,
 }
 
-/// The calibration on which findings are judged.
+/// The calibration that findings are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// There is no fit to the log.
@@ -116,7 +116,7 @@ fn decide(findings: &[Finding], ratio: Option<f64>, is_for_service: bool) -> Ver
         (true, _) => Verdict::Refused,
         (false, true) if ratio <= GOOD_MAX && !findings.iter().any(is_doubtful) => Verdict::Good,
         (false, true) if ratio > LIMITED_MAX => Verdict::Refused,
-        // What other models lack is no fault of the log.
+        // The log is not at fault where another model lacks terms.
         _ => Verdict::Limited,
     }
 }
@@ -187,7 +187,7 @@ mod tests {
         let wild = wild.with_channel(Channel::Rz);
         let rows = Finding::new(Kind::OutlierRows {
             rows: 1,
-            largest_m: 1e-5,
+            largest_um: 10.0,
         });
         let rows = rows.with_channel(Channel::HallA);
         let lag = change(Quantity::Time, TimeCourse::Constant, Channel::Beams);
@@ -197,7 +197,7 @@ mod tests {
         assert_eq!(ranked(alone.clone()), alone);
         let hum = Finding::new(Kind::Hum {
             frequency_hz: 50.0,
-            amplitude_m: 1e-6,
+            amplitude_um: 1.0,
         });
         let of_beam = hum.clone().with_channel(Channel::BeamX);
         assert_eq!(ranked(vec![of_beam.clone(), lag.clone()]), [of_beam]);

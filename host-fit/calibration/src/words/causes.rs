@@ -3,33 +3,41 @@
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Cause, Code, Correction};
 
-/// The evidence and the remedy of a mistake.
-pub(super) fn mistake(
-    code: Code,
-    causes: &[Cause],
-    is_sure: bool,
-    may_be_magnets: bool,
-) -> (String, String) {
-    let corrections: Vec<String> = causes.iter().map(cause).collect();
-    let mut evidence = match is_sure {
-        true => "the log does not match stage.toml. It fits if ",
-        false => "the log is consistent but does not match stage.toml. It would fit if ",
-    }
-    .to_owned();
-    evidence += &corrections.join(", or if ");
+/// The evidence of a mistake.
+pub(super) fn mistake(causes: &[Cause], is_sure: bool, may_be_magnets: bool) -> String {
+    let does_fit = match is_sure {
+        true => "the log does not match stage.toml. It fits",
+        false => "the log is consistent but does not match stage.toml. It would fit",
+    };
+    let mut causes: Vec<String> = causes.iter().map(cause).collect();
     if may_be_magnets {
-        evidence +=
-            ", or if the field of the magnets falls as much faster with height than designed";
+        causes.push(
+            "the field of the magnets falls as much faster with height than designed".to_owned(),
+        );
     }
-    let mut remedy = code.entry().remedy.to_owned();
-    if causes.len() > 1 || may_be_magnets {
-        evidence += ". The log does not show which";
-        remedy = "find out which before you change anything: check wiring, columns, units and stage.toml".to_owned();
-    }
-    if causes.iter().any(|cause| cause.values.is_some()) {
-        remedy += ". The values are rough: find the exact ones";
-    }
-    (evidence, remedy)
+    let undecided = if causes.len() > 1 {
+        ". The log does not show which"
+    } else {
+        ""
+    };
+    format!("{does_fit} if {}{undecided}", causes.join(", or if "))
+}
+
+/// What to do about a mistake.
+pub(super) fn mistake_remedy(code: Code, causes: &[Cause], may_be_magnets: bool) -> String {
+    let what = match causes.len() > 1 || may_be_magnets {
+        true => {
+            "find out which before you change anything: check wiring, columns, units and stage.toml"
+        }
+        false => code.entry().remedy,
+    };
+    let is_rough = causes.iter().any(|cause| cause.values.is_some());
+    let rough = if is_rough {
+        ". The values are rough: find the exact ones"
+    } else {
+        ""
+    };
+    format!("{what}{rough}")
 }
 
 fn cause(cause: &Cause) -> String {

@@ -3,14 +3,14 @@
 use super::{Code, Place};
 use crate::channel::Channel;
 
-/// What changes of a channel.
+/// The quantity of a channel that changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Its gain, %.
     Gain,
     /// Its zero, um.
     Zero,
-    /// Its time, ms: positive if it is later than the others.
+    /// Its time, ms: positive if the channel is late.
     Time,
 }
 
@@ -25,7 +25,7 @@ impl Quantity {
     }
 }
 
-/// How a change of a channel goes over the log.
+/// The course of a change of a channel over the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TimeCourse {
     /// It is the same in the whole log.
@@ -36,7 +36,7 @@ pub enum TimeCourse {
     Log(String),
     /// It grows evenly over the logs.
     OverLog,
-    /// It grows evenly in each movement; the size is what a second adds.
+    /// It grows evenly in each movement; the size is the growth per second.
     OverMovement,
 }
 
@@ -57,7 +57,7 @@ pub enum Correction {
     HallPlaces,
     /// The distances of the capacitive sensors from the middle are multiplied by the value.
     GapPlaces,
-    /// A coordinate of a capacitive sensor in `stage.toml`, "x" or "y", is so many metres.
+    /// A coordinate of a capacitive sensor in `stage.toml`, "x" or "y", has this value, m.
     GapPlace(Channel, &'static str, f64),
     /// The places of the capacitive sensors are turned by the value, degrees.
     GapsTurned,
@@ -100,8 +100,8 @@ pub struct Cause {
 /// One row for each kind: its fields, its code and, where it has one, its size with the unit that JSON names.
 macro_rules! kinds {
     ($($(#[doc = $doc:literal])* $kind:ident { $($field:ident: $type:ty),* } => $code:expr $(, $value:expr, $unit:expr)?;)*) => {
-        /// What was measured. SI units, but for what a name says: `_um`, `_us`, `_k`, `_c`, `_hz`; `share` is in
-        /// parts of the rows. The channel and the place stand in the finding.
+        /// What was measured. A name ends in its unit; `micro` is um or urad, as the axis has it. The channel and the
+        /// place stand in the finding.
         #[derive(Clone, Debug, PartialEq)]
         #[expect(missing_docs, reason = "the names of the fields say what they are")]
         pub enum Kind { $($(#[doc = $doc])* $kind { $($field: $type),* },)* }
@@ -130,32 +130,32 @@ kinds! {
     FileCut { file: String, line: usize } => Code::FileCut;
     /// Movements are separated by the time, every `split_s` seconds and after a gap of more than `gap_rows`.
     MovementsByTime { file: String, movements: usize, split_s: Option<f64>, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
-    /// Mean difference of voltages from whole codes.
+    /// Mean distance of voltages from whole codes.
     BetweenCodes { file: String, mean_codes: f64 } => Code::BetweenCodes, *mean_codes, "codes";
     /// A fit uses `taken` rows in `runs` of rows that follow each other.
     Excerpt { rows: usize, taken: usize, runs: usize } => Code::Excerpt, *taken as f64, "rows";
     /// Rows with the same fault, and the cell of the first.
     RowsSkipped { file: String, reason: &'static str, rows: usize, line: usize, column: usize, name: String } => Code::RowsSkipped, *rows as f64, "rows";
-    /// Movements without a kept row.
+    /// Movements without a row that is kept.
     MovementsSkipped { file: String, movements: Vec<i64>, rows: usize } => Code::RowsSkipped, *rows as f64, "rows";
 
     // Of the times and the signals of a log.
     /// Servo periods without a row.
-    RowsMissing { rows: f64, share: f64, gaps: usize } => Code::RowsMissing, *rows, "rows";
-    /// Times are so far off an even rate.
+    RowsMissing { rows: f64, percent: f64, gaps: usize } => Code::RowsMissing, *rows, "rows";
+    /// Distance of the times from an even rate.
     UnevenTimes { rms_us: f64 } => Code::Jitter, *rms_us, "us";
     /// Rows are farther apart than servo periods; `periods` if that is a whole number.
     OtherRate { period_us: f64, servo_us: f64, periods: Option<f64> } => Code::Jitter, *period_us, "us";
     /// Movements without motion.
     IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
     /// A channel repeats a value, or shows its noise alone, while it should move.
-    Stands { rows: usize, share: f64, longest_s: f64 } => Code::Stuck, *longest_s, "s";
-    /// The same at an end of what the channel reads.
-    StandsAtEnd { rows: usize, share: f64, longest_s: f64 } => Code::Saturated, *rows as f64, "rows";
-    /// Rows of a channel far from those before and behind.
-    OutlierRows { rows: usize, largest_m: f64 } => Code::Outliers, *rows as f64, "rows";
+    Stands { rows: usize, percent: f64, longest_s: f64 } => Code::Stuck, *longest_s, "s";
+    /// The same at the largest or the smallest value of the channel.
+    StandsAtEnd { rows: usize, percent: f64, longest_s: f64 } => Code::Saturated, *rows as f64, "rows";
+    /// Rows of a channel far from the rows before and behind.
+    OutlierRows { rows: usize, largest_um: f64 } => Code::Outliers, *rows as f64, "rows";
     /// A line in the spectrum of a channel.
-    Hum { frequency_hz: f64, amplitude_m: f64 } => Code::Hum, *frequency_hz, "Hz";
+    Hum { frequency_hz: f64, amplitude_um: f64 } => Code::Hum, *frequency_hz, "Hz";
 
     // Of the residuals.
     /// A change of a channel, in the unit of the quantity.
@@ -166,7 +166,7 @@ kinds! {
     ChangesOften {} => Code::ModelLacks;
     /// The Hall residuals over their noise, where no fault explains them.
     Inconsistent { ratio: f64 } => Code::ModelLacks, *ratio, "times";
-    /// Predicted errors of X, Y, Rz in service over the noise floor, from what the log does not determine.
+    /// Predicted errors of X, Y, Rz in service over the noise floor, because the log does not determine the parameters.
     NotDetermined { ratios: [f64; 3] } => Code::NotDetermined;
     /// The worst of these ratios, from all faults of the log together.
     FaultsTogether { ratio: f64 } => Code::NotDetermined;
@@ -177,23 +177,25 @@ kinds! {
 
     // Of a fit.
     /// Rows that count less than half; `end` is the last of them.
-    LeftOut { rows: usize, of: usize, end: Place } => Code::LeftOut, *rows as f64, "rows";
-    /// Rows of a movement on the mean, and the part of the errors that its zero deviation hides.
-    ShortMovements { mean_rows: f64, hidden: f64 } => Code::ShortMovements, *mean_rows, "rows";
+    LeftOut { rows: usize, of: usize, percent: f64, end: Place } => Code::LeftOut, *rows as f64, "rows";
+    /// Rows of a movement on average, and the part of the errors that its zero deviation hides.
+    ShortMovements { mean_rows: f64, hidden_percent: f64 } => Code::ShortMovements, *mean_rows, "rows";
     /// The model is not the field model. Ranges of the errors in service of X, Y, Rz; errors over their noise
     /// where nothing explains them.
-    OtherModel { reason: String, in_service: Option<[[f64; 2]; 3]>, over_noise: Option<f64> } => Code::ModelLacks;
+    OtherModel { reason: String, in_service_micro: Option<[[f64; 2]; 3]>, over_noise: Option<f64> } => Code::ModelLacks;
+    /// A search ended far from the best description of the log; errors over their noise from row to row.
+    PoorFit { over_noise: f64, best: f64 } => Code::ModelLacks, *over_noise, "times";
     /// The model does not describe the motion; rms of the errors and of the motion along an axis.
-    NotDescribed { model: &'static str, error: f64, motion: f64 } => Code::ModelLacks;
+    NotDescribed { model: &'static str, error_micro: f64, motion_micro: f64, unit: &'static str } => Code::ModelLacks;
     /// Zero deviations beyond their range.
-    ZerosClipped { movements: usize, of: usize, largest_m: f64 } => Code::ZeroClipped, *movements as f64, "movements";
+    ZerosClipped { movements: usize, of: usize, largest_um: f64 } => Code::ZeroClipped, *movements as f64, "movements";
     /// Rows that the decoder refuses.
     CodesRefused { rows: usize } => Code::Saturated, *rows as f64, "rows";
     /// The reference is later than the probes, in servo periods, too.
-    LateReference { lag_s: f64, periods: f64 } => Code::ReferenceLag, *lag_s * 1e6, "us";
+    LateReference { lag_us: f64, periods: f64 } => Code::ReferenceLag, *lag_us, "us";
     /// A parameter stands at an end of its search range: its value as reports show it, and in SI.
     AtLimit { parameter: String, shown: (f64, &'static str), value: f64, unit: &'static str } => Code::TermsAtLimit, *value, *unit;
-    /// So many of the vertical terms do.
+    /// Number of vertical terms at an end of their search range.
     VerticalAtLimit { parameters: usize } => Code::TermsAtLimit, *parameters as f64, "";
     /// Movements without a row in a draw.
     MovementsMissed { movements: Vec<String> } => Code::RowsMissing, movements.len() as f64, "movements";

@@ -3,14 +3,14 @@
 use super::Severity;
 use serde::{Serialize, Serializer};
 
-/// Whether the errors that are predicted for service hold beside a finding that is more than a note.
+/// Whether the predicted errors in service hold beside a finding that is more than a note.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trust {
     /// They hold.
     Kept,
-    /// They do not: the verdict is at best limited.
+    /// They do not hold: the verdict is at best limited.
     Lost,
-    /// They hold if the finding is about beams, which are not there in service.
+    /// They hold if the finding is about beams, which do not exist in service.
     LostOfSensors,
 }
 
@@ -27,7 +27,7 @@ pub struct Entry {
     pub meaning: &'static str,
     /// What to do about it.
     pub remedy: &'static str,
-    /// Findings that follow from this one and are left out beside it.
+    /// Findings that are consequences of this code and are hidden beside it.
     pub hides: &'static [Code],
     /// Whether the prediction for service holds beside it.
     pub trust: Trust,

@@ -31,13 +31,13 @@ class LogError(ValueError):
 
 
 class LogRefused(Exception):
-    """A log that is no good for a calibration.
+    """A log that gives no calibration.
 
-    `findings` say what is wrong with it, the most severe first. `code` is the code of the finding that refuses it,
-    None where the errors are beyond `limit`, or where a fit failed without such a finding.
+    `findings`: its faults, the most severe first. `code`: the reason, "no_fit", "findings", "beyond_limit" or
+    "unfinished"; None for a recalibration that failed.
     """
 
-    def __init__(self, message: str, findings: list[Finding]) -> None:
+    def __init__(self, message: str, findings: list[Finding], code: str | None = None) -> None:
         super().__init__(message)
         self.findings = findings
-        self.code = next((found.code for found in findings if found.severity == "refuse"), None)
+        self.code = code

@@ -71,12 +71,16 @@ class Finding(NamedTuple):
 class Findings(list[Finding]):
     """What is wrong with a log, the most severe first."""
 
-    def __init__(self, findings: list[Finding], verdict: str | None, refusal: str | None) -> None:
+    def __init__(
+        self, findings: list[Finding], verdict: str | None, refusal: str | None, refusal_code: str | None
+    ) -> None:
         super().__init__(findings)
         #: "good", "limited" or "refused": of the calibration that the log gives.
         self.verdict = verdict
         #: Why the log is refused; None where it is not.
         self.refusal = refusal
+        #: The same as a name that stays: "no_fit" or "findings"; None where it is not refused.
+        self.refusal_code = refusal_code
 
     def _repr_html_(self) -> str:
         rows = "".join(

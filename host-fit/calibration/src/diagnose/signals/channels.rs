@@ -14,10 +14,10 @@ pub(super) struct LogSignals<'a> {
     pub(super) rows: &'a [Row],
     /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
-    /// By channel and row, m: those of [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE), gaps where the log
-    /// has codes.
+    /// The values by channel and row, m, in the order of
+    /// [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE); gaps only if the log has codes.
     pub(super) channels: Vec<Vec<f64>>,
-    /// Whether a row is used by the tests that follow.
+    /// Whether later tests use a row.
     pub(super) usable: Vec<bool>,
     /// Median time between rows, s.
     pub(super) period_s: f64,
@@ -43,7 +43,7 @@ impl<'a> LogSignals<'a> {
         }
     }
 
-    /// Leaves rows out, and so many on either side.
+    /// Leaves runs of rows out, and `beside` rows on either side.
     pub(super) fn leave_out(
         &mut self,
         runs: impl IntoIterator<Item = Range<usize>>,
@@ -68,7 +68,7 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
     for row in rows {
         let [x, y, rz] = row.reference;
         let turned_m = 0.5 * stage.y_baseline_m * rz.tan();
-        // Through the pose and back equal beams differ by rounding.
+        // Equal beams differ by rounding after the way to a pose and back.
         let beams_m = [x, y + turned_m, y - turned_m].map(|beam_m| f64::from(beam_m as f32));
         let codes = row.frame.capacitive().into_iter().flatten();
         let gaps_m = codes.map(|code| f64::from(code) * stage.capacitive.m_per_count);
@@ -81,7 +81,7 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
     channels
 }
 
-/// The median; 0 of nothing.
+/// The median; 0 if there are no values.
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     statistics::median(&mut values.collect::<Vec<f64>>()).unwrap_or(0.0)
 }

@@ -1,27 +1,27 @@
-//! Hum: lines in the spectra of the residuals that one channel has, too.
+//! Hum: lines in the spectra of the residuals that a channel shares.
 
-use super::CLEAR;
 use super::channels::LogSignals;
 use super::residual::{Residuals, is_seen};
-use crate::diagnose::of_fit::severity;
+use crate::diagnose::limits::CLEAR;
+use crate::diagnose::limits::severity_of_share;
 use crate::judge::spectrum::{Spectrum, windows};
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use std::ops::Range;
 
-/// Longest window, s: its bins tell 50 Hz from 60.
+/// Longest window, s: its bins separate 50 Hz from 60 Hz.
 const WINDOW_S: f64 = 2.0;
-/// Below this many times the frequency of the motion residuals may hold what the model does not describe.
+/// Lines below this many times the frequency of the motion may be terms that the model lacks.
 const OF_MOTION: usize = 8;
 
-/// Names the channels that hum, each at its strongest line above the motion.
+/// The channels that hum, each at its strongest line above the motion.
 pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let longest = log.segments.iter().map(Range::len).max().unwrap_or(0);
     let length = longest
         .min((WINDOW_S / log.period_s).round() as usize)
         .max(1);
     let mut windows = windows(&log.segments, length);
-    // A mean over windows without residuals would count as if all of them had gone in.
+    // Windows with few residuals would lower the mean.
     windows.retain(|window| {
         let used = log.usable[window.clone()].iter().filter(|used| **used);
         2 * used.count() >= length
@@ -33,7 +33,7 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let spectrum = |values: &Vec<f64>| Spectrum::new(values, &windows);
     let raw: Vec<Spectrum> = log.channels.iter().map(spectrum).collect();
     let motion = raw[3..6].iter().map(Spectrum::highest).max().unwrap_or(0);
-    // Channel, amplitude in parts of the noise of a probe, bin.
+    // Channel, amplitude over the noise of the probe, bin.
     let mut lines: Vec<(usize, f64, usize)> = Vec::new();
     for (probe, values) in residuals.values.iter().enumerate() {
         let residual = spectrum(values);
@@ -50,11 +50,11 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
         let &(_, noises, bin) = own.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let kind = Kind::Hum {
             frequency_hz: bin as f64 / (length as f64 * log.period_s),
-            amplitude_m: raw[channel].amplitude(bin),
+            amplitude_um: 1e6 * raw[channel].amplitude(bin),
         };
-        // How much more noise it makes.
+        // The increase of the noise.
         let share = (1.0 + 0.5 * noises * noises).sqrt() - 1.0;
-        let found = Finding::new(kind).with_severity(severity(share).min(Severity::Warn));
+        let found = Finding::new(kind).with_severity(severity_of_share(share).min(Severity::Warn));
         Some(found.with_channel(Channel::SINGLE[channel]))
     };
     (0..raw.len()).filter_map(finding).collect()

@@ -1,18 +1,18 @@
-//! What the signals of a log show by themselves, whatever model is fitted: missing and uneven
-//! rows, sensors that stand still or saturate, jumps, lines in the spectrum.
+//! Faults in the signals of a log, found without a fit or with its residuals: missing and uneven rows, sensors that
+//! stand still or saturate, jumps, lines in the spectrum.
 //!
 //! | module | what it does |
 //! |---|---|
 //! | `channels` | the signals of one log by channel, and places in it |
 //! | `timing` | rows missing, uneven times |
-//! | `still` | movements in which nothing moves, channels that repeat one value |
-//! | `residual` | residuals of the Hall signals, and the channel that explains them |
-//! | `standing` | channels that show no more than their noise |
+//! | `still` | movements without motion, channels that repeat one value |
+//! | `residual` | residuals of the Hall signals, and the error of a channel that explains them |
+//! | `standing` | channels that show only their noise |
 //! | `outliers` | rows that jump |
 //! | `hum` | lines of one frequency |
 //!
-//! Each log is tested alone, and what an earlier test names is left out of the later ones. A
-//! channel is named where it alone explains what was found.
+//! Each log is tested by itself. Rows that a test names are left out of later tests. A channel is named where it
+//! explains the fault without the others.
 
 mod channels;
 mod hum;
@@ -31,13 +31,9 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use residual::Residuals;
 
-/// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.
+/// Rows of a block: its median has no outlier, and its mean a third of the noise of a Hall probe, 0.5 um.
 const BLOCK: usize = 10;
-/// What is beyond so many standard deviations is not noise: once in 10^10 rows, and what residuals have beside
-/// noise gives them longer tails.
-pub(super) const CLEAR: f64 = 6.5;
-
-/// What the signals of a dataset show, log after log, and the rows that no other test is to use.
+/// The faults in the signals, log after log, and the rows that no other test may use.
 ///
 /// `fitted`: the parameters, and the lag of the reference, s.
 pub fn signal_findings(

@@ -1,17 +1,18 @@
-//! Outliers: single rows far from those before and behind.
+//! Outliers: single rows far from the rows before and behind.
 
+use super::BLOCK;
 use super::channels::{LogSignals, median};
 use super::residual::{Residuals, is_seen};
-use super::{BLOCK, CLEAR};
+use crate::diagnose::limits::CLEAR;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Finding, Kind};
 use hallstage_solver::statistics::robust_deviation;
 use rayon::prelude::*;
 
-/// Names rows far outside the noise, by channel, and leaves them out.
+/// Rows far outside the noise, by channel. They are left out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let rows: Vec<usize> = (0..log.rows.len()).filter(|&row| log.usable[row]).collect();
-    // From the median of those about it: beside a step is no outlier.
+    // The distance from the median of the rows around it: a row beside a step is no outlier.
     let off_m = |&row: &usize| {
         let about = about(log, row, BLOCK);
         let middle_m = |values: &Vec<f64>| median(about.iter().map(|&row| values[row]));
@@ -22,7 +23,7 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     let is_far = |(_, off_m): &(usize, [f64; 3])| (0..3).any(|k| off_m[k].abs() > most_m[k]);
     let far: Vec<(usize, [f64; 3])> = rows.into_iter().zip(off_m).filter(is_far).collect();
     far.iter().for_each(|(row, _)| log.usable[*row] = false);
-    // Channel, row, size: a channel that jumps by what the residuals ask of it, before any other.
+    // Channel, row, size. A channel that itself jumps by the error that explains the residuals comes first.
     let cause = |&(row, shown_m): &(usize, [f64; 3])| {
         let beside = about(log, row, 1);
         let worth = |(channel, [size_m, explained]): &(usize, [f64; 2])| {
@@ -41,7 +42,7 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         let first = own().next()?.1;
         let kind = Kind::OutlierRows {
             rows: own().count(),
-            largest_m: own().map(|found| found.2).fold(0.0, f64::max),
+            largest_um: 1e6 * own().map(|found| found.2).fold(0.0, f64::max),
         };
         Some(
             log.found_at(first, kind)
@@ -51,7 +52,7 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     (0..log.channels.len()).filter_map(finding).collect()
 }
 
-/// The usable rows of its movement about a row.
+/// The usable rows of the same movement around a row.
 fn about(log: &LogSignals, row: usize, reach: usize) -> Vec<usize> {
     let rows = row.saturating_sub(reach)..log.rows.len().min(row + reach + 1);
     let movement = |row: usize| log.rows[row].movement;

@@ -1,4 +1,4 @@
-//! Residuals of the Hall signals, and how an error of each channel shows in them.
+//! Residuals of the Hall signals, and the error of a channel that explains them.
 
 use super::channels::{LogSignals, median};
 use crate::diagnose::slopes::Slopes;
@@ -8,22 +8,24 @@ use hallstage_solver::estimator::rows::Rows;
 use hallstage_solver::statistics::{robust_deviation, white_noise};
 use nalgebra::Vector3;
 
-/// A channel shows an error that the residuals ask of it if it moves by this part of it to its inverse; and of
-/// a log that is understood no more than this part of its signals is residuals.
+/// A channel shows an error that explains the residuals if it moves by this part of the error, up to the inverse.
 const SEEN_MIN: f64 = 0.5;
+/// The parameters explain a signal if its residuals are at most this part of it.
+const UNEXPLAINED_MAX: f64 = 0.5;
 
 /// Residuals of the three Hall signals.
 pub(super) struct Residuals {
     slopes: Slopes,
-    /// By probe and row, m at the designed scale; 0 in rows that are left out.
+    /// The residuals by probe and row, m at the designed scale; 0 in rows that are left out.
     pub(super) values: [Vec<f64>; 3],
     /// White noise, m.
     pub(super) noise_m: [f64; 3],
 }
 
 impl Residuals {
-    /// Of parameters, and a lag of the reference. Each movement's own zero, its median, is taken off: a
-    /// fault of some rows moves none of the others. `None` where the parameters do not explain the signals.
+    /// Residuals for these parameters and this lag of the reference. The median of each movement is taken off as its
+    /// zero, so that a fault of some rows does not move the others. `None` where the parameters do not explain the
+    /// signals.
     pub(super) fn new(log: &LogSignals, parameters: &FieldParameters, lag_s: f64) -> Option<Self> {
         let probes = probes(parameters);
         let all: Vec<usize> = log.source.rows.clone().collect();
@@ -53,7 +55,7 @@ impl Residuals {
                 .map(|x| x * x)
                 .sum::<f64>();
             let left_m = robust_deviation(used.iter().map(|&row| values[probe][row]));
-            left_m <= SEEN_MIN * (moved / used.len().max(1) as f64).sqrt()
+            left_m <= UNEXPLAINED_MAX * (moved / used.len().max(1) as f64).sqrt()
         };
         let white = |values: &Vec<f64>| {
             let threes = used.windows(3);
@@ -67,15 +69,15 @@ impl Residuals {
         })
     }
 
-    /// Changes of the residuals by an error of each channel of the log at a row.
+    /// The effect of an error of each channel on the residuals at a row.
     pub(super) fn slopes(&self, log: &LogSignals, row: usize) -> Vec<Vector3<f64>> {
         let here = &log.rows[row];
         let slopes = (self.slopes).at(here.reference.map(|x| x * 1e3), here.vertical);
         slopes.into_iter().take(log.channels.len()).collect()
     }
 
-    /// By channel: the error (m) that explains most of what the residuals (m) show at a row, and by how much it
-    /// lowers their squares, in units of their noise.
+    /// By channel: the error (m) that explains most of the residuals (m) at a row, and how much it lowers their
+    /// squares over their noise.
     pub(super) fn errors(&self, log: &LogSignals, row: usize, shown_m: [f64; 3]) -> Vec<[f64; 2]> {
         let noise_m = Vector3::from(self.noise_m);
         let shown = Vector3::from(shown_m).component_div(&noise_m);
@@ -88,7 +90,7 @@ impl Residuals {
     }
 }
 
-/// Whether a channel shows (m) an error that the residuals ask of it.
-pub(super) fn is_seen(shown_m: f64, asked_m: f64) -> bool {
-    (SEEN_MIN..1.0 / SEEN_MIN).contains(&(shown_m / asked_m))
+/// Whether a channel shows (m) the error (m) that explains the residuals.
+pub(super) fn is_seen(shown_m: f64, error_m: f64) -> bool {
+    (SEEN_MIN..1.0 / SEEN_MIN).contains(&(shown_m / error_m))
 }

@@ -28,7 +28,7 @@ pub(super) fn recording() -> Recording {
     with_rests(0)
 }
 
-/// The same log with so many movements of a stage that stands still behind its own.
+/// The same log, followed by `count` movements of a stage that stands still.
 pub(super) fn with_rests(count: usize) -> Recording {
     let stage = stage();
     let mut run = Protocol::Combined.run(PERIOD_S, 3);
@@ -45,8 +45,8 @@ pub(super) fn codes(error_m: f64) -> i32 {
     (error_m / stage().hall.m_per_count).round() as i32
 }
 
-/// The recording with one of the nine channels held at its value in the first of some rows of a movement, beside
-/// so much of its usual noise.
+/// The recording with one of the nine channels held at the value of the first row, over some rows of a movement, with
+/// this part of its usual noise.
 pub(super) fn held(
     recording: &Recording,
     channel: usize,
@@ -102,8 +102,7 @@ pub(super) fn only(recording: &Recording, code: Code, channel: Option<Channel>) 
     finding.clone()
 }
 
-/// However long the stage stands still beside them, three movements tell no more of a gain, nor of
-/// hum.
+/// Long rests beside three movements make no test of a gain or of hum more certain.
 #[test]
 fn rests_make_no_other_test_of_residuals_more_certain() {
     let found = found(&dataset(&with_rests(150)));
@@ -111,7 +110,7 @@ fn rests_make_no_other_test_of_residuals_more_certain() {
     assert_eq!(codes, [Code::IdleMovement], "{found:#?}");
 }
 
-/// Over minutes the interferometers drift by more than a stage at rest may move.
+/// In minutes the interferometers drift by more than a stage at rest moves.
 #[test]
 fn a_long_rest_is_idle_though_its_reference_drifts() {
     let mut recording = with_rests(1);

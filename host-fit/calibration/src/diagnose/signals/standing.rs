@@ -1,9 +1,10 @@
-//! Channels that stand still, noise aside, where the residuals say that they should move.
+//! Channels that show only their noise where the residuals show that they should move.
 
+use super::BLOCK;
 use super::channels::{LogSignals, levels};
 use super::residual::Residuals;
 use super::still;
-use super::{BLOCK, CLEAR};
+use crate::diagnose::limits::CLEAR;
 use crate::judge::spectrum::windows;
 use hallstage_input::finding::Finding;
 use rayon::prelude::*;
@@ -12,8 +13,7 @@ use std::ops::Range;
 /// Rows of a window.
 const WINDOW: usize = BLOCK * BLOCK;
 
-/// Names channels that stand still in windows in which their motion would explain the residuals better than
-/// an error of any other.
+/// Channels that stand still in windows where their motion would explain the residuals better than any other error.
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut windows = windows(&log.segments, WINDOW);
     windows.retain(|window| log.usable[window.clone()].iter().all(|used| *used));
@@ -28,7 +28,7 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
             _ => runs[channel].push(window),
         }
     }
-    // It may have begun and ended in the windows beside.
+    // The channel may stand still in parts of the windows beside, too.
     still::named(log, runs, WINDOW)
 }
 
@@ -44,7 +44,7 @@ fn stuck_in(log: &LogSignals, residuals: &Residuals, window: &Range<usize>) -> O
         .values
         .each_ref()
         .map(|values| centred(values).collect::<Vec<_>>());
-    // By channel: what its errors explain, and their squares.
+    // By channel: the residuals that its errors explain, and the squares of these errors.
     let mut sums = vec![[0.0; 2]; log.channels.len()];
     for block in 0..BLOCK {
         let row = window.start + block * BLOCK + BLOCK / 2;

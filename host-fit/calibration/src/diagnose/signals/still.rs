@@ -1,19 +1,20 @@
-//! What stands still: movements in which nothing moves, and channels that repeat one value.
+//! Movements without motion, and channels that repeat one value.
 
+use super::BLOCK;
 use super::channels::{LogSignals, levels};
-use super::{BLOCK, CLEAR};
-use crate::diagnose::of_fit::severity;
+use crate::diagnose::limits::CLEAR;
+use crate::diagnose::limits::severity_of_share;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use std::ops::Range;
 
-/// What moves by less stands still, m: a few times what the interferometers drift in a movement.
+/// Motion below this is none, m: it is a few times the drift of the interferometers in a movement.
 const STILL_M: f64 = 2e-6;
 
-/// Names movements in which nothing moves; their rows are left out.
+/// Movements without motion. Their rows are left out.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let is_idle = |rows: &&Range<usize>| {
-        // Over longer the interferometers of a stage at rest drift.
+        // In short pieces, because the interferometers of a stage at rest drift.
         let rests = |start: usize| {
             let piece = start..rows.end.min(start + BLOCK);
             (3..6).all(|beam| spread(&log.channels[beam][piece.clone()]) < STILL_M)
@@ -31,13 +32,13 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     Some(log.found_at(first, kind))
 }
 
-/// Names channels that repeat a value for longer than noise does.
+/// Channels that repeat a value for longer than noise does.
 pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
     let (hall_m, gap_m) = (log.stage.hall.m_per_count, log.stage.capacitive.m_per_count);
-    // Those of beams are nm.
+    // A code of a beam is a nanometre.
     let codes_m = [hall_m, 1e-9, gap_m];
     let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
-        // Not by the median: a channel that is read at a tenth of the rate mostly has no second differences.
+        // The mean square: the median is zero for a channel that is refreshed every tenth row.
         let threes = log
             .segments
             .iter()
@@ -46,7 +47,7 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
         let squares: f64 = second.map(|x| x * x).sum();
         let white_m = (squares / (6.0 * values.len() as f64)).sqrt();
         let code_m = codes_m[channel / 3];
-        // The chance of the most likely code, and for how long it is as rare as what is clear.
+        // The chance of the most likely code, and the length of a run that is as rare as a clear deviation.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
         let least = match spread(values) {
             0.0 => 2.0,
@@ -65,8 +66,8 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
     named(log, runs, 2)
 }
 
-/// Whether a channel should show something in these rows: a probe its noise, which is many codes; a beam
-/// motion that a probe shows, a gap that of another.
+/// Whether a channel should change in these rows. A probe always has noise of many codes. A beam moves where a probe
+/// moves, a gap where another gap moves.
 fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
     match channel {
         0..3 => true,
@@ -75,15 +76,15 @@ fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
     }
 }
 
-/// How far some channels move by the levels of rows, m.
+/// The largest motion of some channels by the medians of blocks, m.
 fn motion_m(log: &LogSignals, channels: Range<usize>, rows: &Range<usize>) -> f64 {
     let channels = log.channels[channels].iter();
     let moved = channels.map(|values| spread(&levels(&values[rows.clone()])));
     moved.fold(0.0, f64::max)
 }
 
-/// Names channels that stand still in runs of rows, by channel, at their longest: as saturated where that is an
-/// end of what the channel reads. The rows are left out, and so many on either side.
+/// Findings for channels that stand still in runs of rows, at the longest run: as saturated where its value is the
+/// largest or the smallest of the channel. The rows and `beside` rows on either side are left out.
 pub(super) fn named(
     log: &mut LogSignals,
     runs: Vec<Vec<Range<usize>>>,
@@ -93,6 +94,7 @@ pub(super) fn named(
         let longest = runs.iter().max_by_key(|run| run.len())?;
         let rows = runs.iter().map(Range::len).sum::<usize>();
         let share = rows as f64 / log.rows.len() as f64;
+        let percent = 100.0 * share;
         let values = &log.channels[channel];
         let value = values[longest.start];
         let is_end = values.iter().all(|&x| x <= value) != values.iter().all(|&x| x >= value);
@@ -101,26 +103,26 @@ pub(super) fn named(
         let kind = match is_flat && is_end {
             true => Kind::StandsAtEnd {
                 rows,
-                share,
+                percent,
                 longest_s,
             },
             false => Kind::Stands {
                 rows,
-                share,
+                percent,
                 longest_s,
             },
         };
         let found = log
             .found_at(longest.start, kind)
             .with_channel(Channel::SINGLE[channel]);
-        Some(found.with_severity(severity(share).max(Severity::Warn)))
+        Some(found.with_severity(severity_of_share(share).max(Severity::Warn)))
     };
     let findings = runs.iter().enumerate().filter_map(finding).collect();
     log.leave_out(runs.into_iter().flatten(), beside);
     findings
 }
 
-/// Largest less smallest.
+/// The largest value less the smallest.
 fn spread(values: &[f64]) -> f64 {
     let end = |end: fn(f64, f64) -> f64| values.iter().copied().reduce(end).unwrap_or(0.0);
     end(f64::max) - end(f64::min)

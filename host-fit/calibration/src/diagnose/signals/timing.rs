@@ -1,13 +1,13 @@
 //! Rows missing, and rows at uneven times or another rate.
 
 use super::channels::LogSignals;
-use crate::diagnose::of_fit::severity;
+use crate::diagnose::limits::severity_of_share;
 use hallstage_input::finding::{Finding, Kind, Severity};
 
-/// What the times of rows show against their sequence. Shares of the rows, and of the period: at 1 mm/s and
-/// 2 ms a part of 2 % is 40 nm of motion.
+/// Missing rows and uneven times, from times and sequence numbers. Severity is by the share of the rows or of the
+/// period: 2 % of 2 ms at 1 mm/s is 40 nm of motion.
 pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
-    // Rows, and the servo periods and the time (us) since the one before.
+    // Each row with the servo periods and the time (us) since the row before.
     let step = |row: usize| {
         let [before, here] = [row - 1, row].map(|row| &log.rows[row]);
         let periods = (here.frame.sequence()).wrapping_sub(before.frame.sequence());
@@ -28,20 +28,20 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
         let share = missing / (missing + log.rows.len() as f64);
         let kind = Kind::RowsMissing {
             rows: missing,
-            share,
+            percent: 100.0 * share,
             gaps: gaps.len(),
         };
         let lost = log.found_at(*first, kind);
-        found.push(lost.with_severity(severity(share).min(Severity::Warn)));
+        found.push(lost.with_severity(severity_of_share(share).min(Severity::Warn)));
     }
-    if severity(rms_us / period_us) > Severity::Note {
+    if severity_of_share(rms_us / period_us) > Severity::Note {
         found.push(Finding::new(Kind::UnevenTimes { rms_us }));
     }
     let servo_us = log.stage.servo_period_s * 1e6;
     let servo_periods = period_us / servo_us;
-    if severity((servo_periods - 1.0).abs()) > Severity::Note {
+    if severity_of_share((servo_periods - 1.0).abs()) > Severity::Note {
         let whole = servo_periods.round().max(1.0);
-        let severity = severity((servo_periods / whole - 1.0).abs()).min(Severity::Warn);
+        let severity = severity_of_share((servo_periods / whole - 1.0).abs()).min(Severity::Warn);
         let periods = (severity == Severity::Note).then_some(whole);
         let kind = Kind::OtherRate {
             period_us,
@@ -68,7 +68,7 @@ mod tests {
         (found[0].code(), found[0].severity, value)
     }
 
-    /// One row of so many is missing.
+    /// One row of `count` is missing.
     fn without_one_of(count: usize) -> Dataset {
         let sound = dataset(&recording());
         let mut gappy = sound.clone();
@@ -85,7 +85,7 @@ mod tests {
         gappy
     }
 
-    /// With so many servo periods from row to row.
+    /// With this many servo periods from row to row.
     fn every(periods: f64) -> Dataset {
         let mut dataset = dataset(&recording());
         for movement in dataset.movements.clone() {

@@ -1,8 +1,8 @@
-//! Which fault would explain the residuals best, the parameters profiled out.
+//! The fault that explains the residuals best, with the parameters profiled out.
 
-use super::columns::{Bank, Course, Family, families};
+use super::effects::{Effects, Shape, Suspect, suspects};
 use super::estimate::{Estimate, RESIDUAL, WIDTH};
-use super::{NOTHING, UNDECIDED};
+use crate::diagnose::limits::UNDECIDED;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::Quantity;
 use hallstage_solver::estimator::gauss_newton::{Factor, Normal};
@@ -14,19 +14,22 @@ use std::ops::Range;
 /// A fault that explains something.
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
-    pub(super) family: Family,
-    pub(super) course: Course,
-    /// By how much it makes chi-square smaller.
+    pub(super) suspect: Suspect,
+    pub(super) shape: Shape,
+    /// How much it lowers chi-square.
     pub(super) gain: f64,
-    /// Other channels or groups that explain it as well.
+    /// Other channels or groups that explain the log as well.
     pub(super) alike: Vec<Channel>,
 }
 
+/// A fault is not tested where the parameters can follow all but this part of its information.
+const SEEN_MIN: f64 = 0.01;
+
 type Columns = SMatrix<f64, WIDTH, 3>;
 
-/// Everything that a scan needs of an estimate.
+/// An estimate, prepared to be scanned for faults.
 pub(super) struct Scan<'a> {
-    bank: &'a Bank<'a>,
+    effects: &'a Effects<'a>,
     estimate: &'a Estimate,
     /// The rows of the estimate, whitened backwards too.
     rows: Vec<Columns>,
@@ -36,7 +39,7 @@ pub(super) struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
-    pub(super) fn new(bank: &'a Bank, estimate: &'a Estimate) -> Option<Self> {
+    pub(super) fn new(effects: &'a Effects, estimate: &'a Estimate) -> Option<Self> {
         let mut steps = Vec::with_capacity(estimate.gains.len());
         for gain in &estimate.gains {
             let of = [gain.by_pose, gain.kalman, gain.factor];
@@ -44,7 +47,7 @@ impl<'a> Scan<'a> {
             steps.push([by_error, kalman, factor.try_inverse()?]);
         }
         let mut rows: Vec<Columns> = estimate.rows.iter().map(|row| (*row).into()).collect();
-        for movement in &bank.log.means.movements {
+        for movement in &effects.means.rows.movements {
             let mut error = Columns::zeros();
             for at in movement.clone().rev() {
                 let [by_error, kalman, to_white] = &steps[at];
@@ -53,48 +56,48 @@ impl<'a> Scan<'a> {
             }
         }
         Some(Self {
-            bank,
+            effects,
             estimate,
             rows,
             steps,
         })
     }
 
-    /// The best courses of each row of the bank.
+    /// The best shapes of each suspect.
     pub(super) fn faults(&self) -> Vec<Fault> {
-        let families: Vec<Family> = families().collect();
-        let of_family = families
+        let suspects: Vec<Suspect> = suspects().collect();
+        let faults = suspects
             .into_par_iter()
-            .flat_map_iter(|family| self.of_family(family));
-        of_family.collect()
+            .flat_map_iter(|suspect| self.faults_of(suspect));
+        faults.collect()
     }
 
-    fn of_family(&self, family: Family) -> impl Iterator<Item = Fault> {
-        let all = 0..self.bank.log.means.rows.len();
-        let raw = self.bank.raw(family);
-        let whole = |course| {
-            let column = self.bank.column(family, course);
+    fn faults_of(&self, suspect: Suspect) -> impl Iterator<Item = Fault> {
+        let all = 0..self.effects.means.rows.rows.len();
+        let raw = self.effects.constant(suspect);
+        let whole = |shape| {
+            let column = self.effects.shaped(suspect, shape);
             let found = self.scan(&column, &all, |at| at == 0);
-            found.first().map(|(_, gain)| (course, *gain))
+            found.first().map(|(_, gain)| (shape, *gain))
         };
         let mut found = Vec::new();
-        if family.0 == Quantity::Time {
-            found.push(whole(Course::On(0, all.end)));
+        if suspect.quantity == Quantity::Time {
+            found.push(whole(Shape::From(0, all.end)));
         }
         // Channels of a kind have one clock.
-        if family.0 != Quantity::Time || !family.is_single() {
-            found.push(whole(Course::Ramp));
+        if suspect.quantity != Quantity::Time || !suspect.is_single() {
+            found.push(whole(Shape::Ramp));
         }
-        if family.stays() {
+        if suspect.can_stay() {
             found.push(self.onset(&raw, std::slice::from_ref(&all)));
         }
-        if family.ends_with_movement() {
-            found.push(whole(Course::RampInMovements));
-            found.push(self.onset(&raw, &self.bank.log.means.movements));
+        if suspect.ends_with_movement() {
+            found.push(whole(Shape::RampInMovements));
+            found.push(self.onset(&raw, &self.effects.means.rows.movements));
         }
-        let fault = move |(course, gain)| Fault {
-            family,
-            course,
+        let fault = move |(shape, gain)| Fault {
+            suspect,
+            shape,
             gain,
             alike: Vec::new(),
         };
@@ -102,9 +105,9 @@ impl<'a> Scan<'a> {
     }
 
     /// The onset that explains most: a fault from there on to the end of its range.
-    fn onset(&self, raw: &[[f64; 3]], ranges: &[Range<usize>]) -> Option<(Course, f64)> {
-        // First far apart, then all about the best. The square root would be quickest, but a step near the end of a
-        // movement shows for a moment only.
+    fn onset(&self, raw: &[[f64; 3]], ranges: &[Range<usize>]) -> Option<(Shape, f64)> {
+        // First means far apart, then all means near the best. Half the square root of their number apart, because a
+        // step near the end of a movement shows only for a moment.
         let apart = (raw.len().isqrt() / 2).max(1);
         let coarse = ranges.iter().filter_map(|range| {
             let wanted = |at: usize| at > range.start && (at - range.start).is_multiple_of(apart);
@@ -114,28 +117,34 @@ impl<'a> Scan<'a> {
         let wanted = |at: usize| at > range.start && at.abs_diff(around) < apart;
         let fine = self.scan(raw, range, wanted);
         // Things change between movements rather than within them.
-        let is_start = |at: usize| self.bank.log.means.movements.iter().any(|m| m.start == at);
+        let is_start = |at: usize| {
+            self.effects
+                .means
+                .rows
+                .movements
+                .iter()
+                .any(|m| m.start == at)
+        };
         let between = largest(fine.iter().copied().filter(|(at, _)| is_start(*at)));
         let best = largest(fine)?;
         let between = between.filter(|(_, gain)| *gain > best.1 - UNDECIDED);
         let (from, gain) = between.unwrap_or(best);
-        Some((Course::On(from, range.end), gain))
+        Some((Shape::From(from, range.end), gain))
     }
 
-    /// The gains of a column from each wanted mean on to the end of a range, which is that of a movement.
+    /// The gains of a column that begins at each wanted mean and ends with a range of whole movements.
     fn scan(
         &self,
         raw: &[[f64; 3]],
         range: &Range<usize>,
         wanted: impl Fn(usize) -> bool,
     ) -> Vec<(usize, f64)> {
-        let movements = self.bank.log.means.movements.iter().rev();
+        let movements = self.effects.means.rows.movements.iter().rev();
         let mut found = Vec::new();
         let mut products = SVector::<f64, WIDTH>::zeros();
         let mut squares = 0.0;
         for movement in movements.filter(|m| range.contains(&m.start)) {
-            // By an error of the reference so far, the squares of the rest of the movement are e' `own` e - 2 `by` e
-            // more.
+            // An error e of the reference up to here adds e' `own` e - 2 `by` e to the squares of the rest.
             let (mut own, mut by) = (Matrix3::zeros(), Vector3::zeros());
             for at in movement.clone().rev() {
                 let ([by_error, kalman, to_white], x) = (&self.steps[at], Vector3::from(raw[at]));
@@ -155,13 +164,13 @@ impl<'a> Scan<'a> {
         found
     }
 
-    /// What a column gains by its products with the rows and its squares.
+    /// The gain of a column from its products with the rows and its squares.
     fn gain(&self, products: &SVector<f64, WIDTH>, squares: f64) -> Option<f64> {
         let size = UNKNOWNS + self.estimate.sizes().len();
         let by = DVector::from_column_slice(&products.as_slice()[..size]);
         let score = products[RESIDUAL] - by.dot(&self.estimate.step);
         let information = squares - by.dot(&self.estimate.curvature.solve(&by));
-        (information > NOTHING * squares).then(|| score * score / information)
+        (information > SEEN_MIN * squares).then(|| score * score / information)
     }
 }
 
@@ -169,19 +178,19 @@ fn largest(of: impl IntoIterator<Item = (usize, f64)>) -> Option<(usize, f64)> {
     of.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Another stage, or another state of it, from a mean on.
+/// Another stage, or another state of the stage, from a mean on.
 #[derive(Debug)]
 pub(super) struct Split {
     /// The first mean of the second part.
     pub(super) from: usize,
-    /// By how much parameters of their own make chi-square smaller.
+    /// How much parameters of its own lower chi-square.
     pub(super) gain: f64,
-    /// By how much the parameters of the second part differ from the common ones.
+    /// The parameters of the second part less the common parameters.
     pub(super) off: DVector<f64>,
 }
 
-/// The onset, out of some, from which on parameters of their own explain most. Each part has half of the prior,
-/// so that both together are the common fit.
+/// The best of some onsets to split the log into parts with parameters of their own. Each part has half of the
+/// prior, so that equal parts are the common fit.
 pub(super) fn split(estimate: &Estimate, onsets: impl Iterator<Item = usize>) -> Option<Split> {
     let half = 0.5 * &estimate.prior;
     let whole = &estimate.squares * &estimate.step;
@@ -200,6 +209,6 @@ pub(super) fn split(estimate: &Estimate, onsets: impl Iterator<Item = usize>) ->
         let gain = first + second - whole.dot(&estimate.step);
         Some(Split { from, gain, off })
     };
-    let all = onsets.filter_map(at);
-    all.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    let splits = onsets.filter_map(at);
+    splits.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }

@@ -1,8 +1,8 @@
 //! Faults of known size in simulated logs, and logs without any.
 
-use super::columns::Bank;
+use super::effects::Effects;
 use super::estimate::Estimate;
-use super::means::Log;
+use super::means::Means;
 use super::score::Scan;
 use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{FitSettings, ModelChoice, fit};
@@ -115,7 +115,7 @@ fn channels_that_are_late_and_a_clock_that_drifts_are_named_and_taken_off() {
             (found.value().expect("ms") - late_ms).abs() < 0.1 * late_ms,
             "{found:?}"
         );
-        // Of one that is late at work, too, nothing says what motion makes of it.
+        // The errors of a late sensor in service depend on the motion.
         let verdict = match channel {
             "ifm" => Verdict::Good,
             _ => Verdict::Limited,
@@ -135,16 +135,18 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
     });
     let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
     let parameters = fitted.estimate.parameters;
-    let log = Log::new(&dataset, &stage, &probes(&parameters));
-    let first = Estimate::first(&log, &parameters, &[]);
-    let estimate = first.and_then(|first| first.faultless(&log)).expect("one");
-    let bank = Bank::new(&log, &stage, &estimate.parameters, estimate.lag_s());
-    let candidates = Scan::new(&bank, &estimate).expect("one").faults();
+    let means = Means::new(&dataset, &stage, &probes(&parameters));
+    let first = Estimate::first(&means, &parameters, &[]);
+    let estimate = first
+        .and_then(|first| first.faultless(&means))
+        .expect("one");
+    let effects = Effects::new(&means, &stage, &estimate.parameters, estimate.lag_s());
+    let candidates = Scan::new(&effects, &estimate).expect("one").faults();
     let large = candidates.iter().filter(|candidate| candidate.gain > 300.0);
     assert!(large.clone().count() > 10);
     for candidate in large {
-        let column = bank.column(candidate.family, candidate.course);
-        let with = estimate.with_faults(&log, &[column]).expect("one");
+        let column = effects.shaped(candidate.suspect, candidate.shape);
+        let with = estimate.with_faults(&means, &[column]).expect("one");
         let gain = estimate.chi_squared - with.chi_squared;
         assert!(
             (gain / candidate.gain - 1.0).abs() < 0.1,
@@ -191,7 +193,7 @@ fn a_clean_log_raises_nothing_above_a_note() {
     }
 }
 
-/// The finding has what it would cost, the calibration is that of the gain at the end.
+/// The finding has its original cost, and the calibration has the gain at the end.
 #[test]
 fn a_gain_that_changes_is_named_with_channel_onset_size_and_cost_and_taken_off() {
     let (stage, sound) = (stage(), recording(3).dataset(&stage()).expect("a triangle"));

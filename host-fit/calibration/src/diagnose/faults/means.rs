@@ -1,8 +1,7 @@
-//! A log in means over a few rows each, rows far from the others left out.
+//! A log in means over a few rows each, without rows far from the others.
 
-use super::columns::families;
-use super::{MEANS_MAX, RARITY};
-use crate::diagnose::signals::CLEAR;
+use super::effects::suspects;
+use crate::diagnose::limits::{CLEAR, MEANS_MAX, RARITY};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
@@ -12,15 +11,15 @@ use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::statistics::white_noise;
 use std::ops::Range;
 
-/// Each so many rows of a movement have a noise of their own, known within a tenth.
+/// Rows of a piece of a movement with a noise of its own, which is known within a tenth.
 const PIECE: usize = 500;
 
-/// A log.
+/// A log in means.
 #[derive(Debug)]
-pub(super) struct Log {
-    /// The means, each a block; the number of its rows is the weight.
-    pub(super) means: Rows,
-    /// The first row of each in the dataset.
+pub(super) struct Means {
+    /// The means, each a block; the weight is the number of rows.
+    pub(super) rows: Rows,
+    /// The first row of each mean in the dataset.
     pub(super) first: Vec<usize>,
     /// White noise of A, B, C from row to row, mm.
     pub(super) white_mm: [f64; 3],
@@ -28,8 +27,8 @@ pub(super) struct Log {
     pub(super) resets_mm: Option<[f64; 3]>,
 }
 
-impl Log {
-    /// The rows of a dataset; `probes` are those of a first fit.
+impl Means {
+    /// The rows of a dataset; `probes` predict its signals.
     pub(super) fn new(dataset: &Dataset, stage: &Stage, probes: &[Probe; 3]) -> Self {
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
         let mut rows = Rows::new(dataset, &all);
@@ -46,7 +45,7 @@ impl Log {
         };
         let movements: Vec<Range<usize>> = rows.movement_rows().collect();
         let white_mm = white(&movements);
-        // Rows far off the middle of their block, as beside a step, are left out.
+        // Rows far from the middle of their block, as beside a step, have no weight.
         for block in rows.blocks.clone() {
             for (k, white_mm) in white_mm.into_iter().enumerate() {
                 let mut values: Vec<f64> = residuals[block.clone()].iter().map(|r| r[k]).collect();
@@ -69,29 +68,29 @@ impl Log {
                 (rows.rows[piece].iter_mut()).for_each(|row| row.weight *= weight);
             }
         }
-        let (means, first) = rows.means(MEANS_MAX);
+        let (rows, first) = rows.means(MEANS_MAX);
         Self {
-            means,
+            rows,
             first,
             white_mm,
             resets_mm: stage.resets_mm(),
         }
     }
 
-    /// How many numbers the means hold beyond the parameters and the offsets of the movements.
+    /// Degrees of freedom: numbers in the means less parameters and offsets of the movements.
     pub(super) fn freedom(&self) -> f64 {
-        let offsets = self.resets_mm.map_or(self.means.movements.len(), |_| 0);
-        (3.0 * (self.means.rows.len() - offsets) as f64 - COUNT as f64).max(1.0)
+        let offsets = self.resets_mm.map_or(self.rows.movements.len(), |_| 0);
+        (3.0 * (self.rows.rows.len() - offsets) as f64 - COUNT as f64).max(1.0)
     }
 
-    /// What a number more, of an unknown, has to gain in chi-square (Schwarz 1978).
+    /// The gain in chi-square that an additional unknown needs (Schwarz 1978).
     pub(super) fn per_unknown(&self) -> f64 {
-        libm::log(3.0 * self.means.rows.len() as f64)
+        libm::log(3.0 * self.rows.rows.len() as f64)
     }
 
-    /// What a fault has to gain: an unknown out of all families and onsets, in a log that has it rarely.
+    /// The gain that a fault needs: it is one unknown out of all suspects and onsets, and rare.
     pub(super) fn per_fault(&self) -> f64 {
-        let choices = families().count() * self.means.rows.len();
+        let choices = suspects().count() * self.rows.rows.len();
         self.per_unknown() + 2.0 * libm::log(RARITY * choices as f64)
     }
 }

@@ -1,17 +1,17 @@
-//! The findings of the bank.
+//! The faults as findings.
 
-use super::Job;
-use super::columns::Course;
+use super::Finder;
+use super::effects::Shape;
 use super::score::Fault;
 use crate::judge::predicted::Predicted;
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::{Finding, Kind, Severity, TimeCourse};
 
-impl Job<'_> {
-    /// Movement and time of a mean, and its log if that begins there.
+impl Finder<'_> {
+    /// The movement and the time of a mean, and its log if the log begins there.
     fn place(&self, at: usize) -> (String, i64, Option<String>) {
-        let (dataset, first) = (&self.dataset, &self.log.first);
+        let (dataset, first) = (&self.dataset, &self.means.first);
         let movement = |at: usize| &dataset.movements[dataset.rows[first[at]].movement];
         let log = movement(at).log;
         let begins = at > 0 && movement(at - 1).log != log;
@@ -20,46 +20,48 @@ impl Job<'_> {
         (name, dataset.rows[first[at]].t_us, log)
     }
 
+    /// From a mean on the log is of another stage, or of another state of the stage.
     pub(super) fn other_state(&self, from: usize, cost: f64) -> Finding {
         let (movement, t_us, log) = self.place(from);
         let found = Finding::new(Kind::OtherState { log }).with_severity(severity(cost));
         found.with_place(movement, t_us).with_cost(cost)
     }
 
+    /// A fault of this size, in the unit of its quantity.
     pub(super) fn finding(&self, fault: &Fault, size: f64, cost: f64) -> Finding {
-        let (movement, t_us, log) = self.place(fault.course.onset().unwrap_or(0));
-        let course = match (fault.course, log) {
-            (Course::On(0, _), _) => TimeCourse::Constant,
-            (Course::On(..), Some(log)) => TimeCourse::Log(log),
-            (Course::On(..), None) => TimeCourse::Onset,
-            (Course::Ramp, _) => TimeCourse::OverLog,
-            (Course::RampInMovements, _) => TimeCourse::OverMovement,
+        let (movement, t_us, log) = self.place(fault.shape.onset().unwrap_or(0));
+        let course = match (fault.shape, log) {
+            (Shape::From(0, _), _) => TimeCourse::Constant,
+            (Shape::From(..), Some(log)) => TimeCourse::Log(log),
+            (Shape::From(..), None) => TimeCourse::Onset,
+            (Shape::Ramp, _) => TimeCourse::OverLog,
+            (Shape::RampInMovements, _) => TimeCourse::OverMovement,
         };
-        let quantity = fault.family.0;
+        let quantity = fault.suspect.quantity;
         let mut found = Finding::new(Kind::Change {
             quantity,
             course,
             size,
         });
-        if fault.course.onset().is_some() {
+        if fault.shape.onset().is_some() {
             found = found.with_place(movement, t_us);
         }
         Finding {
             alike: fault.alike.clone(),
-            ..found.with_channel(fault.family.channel())
+            ..found.with_channel(fault.suspect.channel())
         }
         .with_severity(severity(cost))
         .with_cost(cost)
     }
 }
 
-/// That the log leaves so much open.
+/// The log does not determine the calibration.
 pub(super) fn not_determined(predicted: &Predicted) -> Finding {
     let ratios = predicted.ratio;
     Finding::new(Kind::NotDetermined { ratios }).with_cost(predicted.worst_ratio())
 }
 
-/// That a channel has more faults than are repaired.
+/// A channel has more faults than are repaired.
 pub(super) fn changes_often(channel: Channel, cost: f64) -> Finding {
     let severity = severity(cost).max(Severity::Warn);
     let found = Finding::new(Kind::ChangesOften {}).with_severity(severity);

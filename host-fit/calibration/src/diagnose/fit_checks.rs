@@ -1,5 +1,6 @@
-//! What a fit says of itself, as findings.
+//! Findings about the fit itself.
 
+use super::limits::{ERROR_TO_NOISE_MAX, severity_of_share};
 use crate::fit::Fit;
 use crate::judge::identify::{FitFailure, check_described};
 use crate::judge::predicted::Predicted;
@@ -11,26 +12,10 @@ use hallstage_input::finding::{Finding, Kind, Place, Severity};
 use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 
-/// A fault in this part of the rows, or one that makes noise or a period so much larger, is worth a warning, ...
-const WARN_MIN: f64 = 0.02;
-/// ... and refused from this on: the rest may be another stage than the log shows.
-const REFUSED_MIN: f64 = 0.08;
-/// Errors beyond this many times their white noise are not the drift of an interferometer.
-pub const ERROR_TO_NOISE_MAX: f64 = 3.0;
-
-/// Of a fault by its share of the rows, of the noise or of a period.
-pub(super) const fn severity(share: f64) -> Severity {
-    match share {
-        REFUSED_MIN.. => Severity::Refuse,
-        WARN_MIN.. => Severity::Warn,
-        _ => Severity::Note,
-    }
-}
-
 /// The rows that count less than half in a fit, where they are more than a few.
 pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let left_out = fit.fitted.left_out(dataset);
-    let severity = severity(left_out.share());
+    let severity = severity_of_share(left_out.share());
     let (first, last) = left_out.span.filter(|_| severity > Severity::Note)?;
     let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
     let end = Place {
@@ -40,13 +25,14 @@ pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let kind = Kind::LeftOut {
         rows: left_out.rows,
         of: left_out.of,
+        percent: 100.0 * left_out.share(),
         end,
     };
     let found = Finding::new(kind).with_severity(severity);
     Some(found.with_place(from, first.t_us))
 }
 
-/// Whether the errors of a model with zero deviations are too small, for each fits a row of its movement.
+/// Movements so short that their zero deviations make the errors too small: each zero deviation fits one row.
 pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {
     if fit.is_some_and(|fit| !fit.model.has_zero_deviation) {
         return None;
@@ -60,13 +46,13 @@ pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Fi
     let severity = verdict::severity(1.0 / shown);
     let kind = Kind::ShortMovements {
         mean_rows: mean,
-        hidden: 1.0 - shown,
+        hidden_percent: 100.0 * (1.0 - shown),
     };
     (severity > Severity::Note).then(|| Finding::new(kind).with_severity(severity))
 }
 
-/// Why a fit is not the field model, and what it is good for; a warning where its errors are so many times their
-/// noise that no other finding explains.
+/// The reason for another model than the field model, with its errors in service. A warning where its errors are far
+/// above their noise, `unexplained` by other findings.
 pub(super) fn not_field(
     fit: &Fit,
     predicted: Option<&Predicted>,
@@ -76,14 +62,15 @@ pub(super) fn not_field(
     let severity = over_noise.map_or(Severity::Note, |_| Severity::Warn);
     let kind = Kind::OtherModel {
         reason: fit.model_reason.clone(),
-        in_service: predicted.map(|predicted| predicted.range),
+        in_service_micro: predicted
+            .map(|predicted| predicted.range.map(|ends| ends.map(|end| end * 1e6))),
         over_noise,
     };
     let found = Finding::new(kind).with_severity(severity);
     (fit.model.kind != ModelKind::Field).then_some(found)
 }
 
-/// A fit that leaves most of the motion unexplained and was kept all the same.
+/// A fit that explains too little of the motion and is kept because the user wants it.
 pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let errors = fit.sound_errors(dataset, stage);
     let failure = check_described(dataset, &errors, fit.model).err()?;
@@ -98,8 +85,9 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option
     };
     let kind = Kind::NotDescribed {
         model,
-        error: error_micro * 1e-6,
-        motion: motion_micro * 1e-6,
+        error_micro,
+        motion_micro,
+        unit: motion.micro_unit(),
     };
     let axis = Channel::POSE[motion as usize];
     Some(
@@ -109,7 +97,7 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option
     )
 }
 
-/// rms errors of a fit over their noise from sample to sample, of the worst axis.
+/// rms errors of a fit over their noise from row to row, of the worst axis.
 pub fn over_noise(fit: &Fit, dataset: &Dataset) -> f64 {
     let errors = fit.errors_by_row(dataset);
     let ratios = statistics::over_noise(&errors, &dataset.movements);

@@ -1,8 +1,9 @@
-//! The most likely parameters of the field model, with faults as further unknowns: the fit's own equations
-//! and prior, over means.
+//! The most likely parameters of the field model, with faults as further unknowns. Equations and prior are the
+//! fit's, over means.
 
-use super::means::Log;
-use super::{FAULTS_MAX, ROUNDS};
+use super::FAULTS_MAX;
+use super::means::Means;
+use crate::diagnose::limits::ROUNDS;
 use hallstage_solver::estimator::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
 use hallstage_solver::estimator::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
 use hallstage_solver::estimator::parameters::{FieldParameters, HELD, unknowns};
@@ -11,22 +12,21 @@ use hallstage_solver::estimator::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERM
 use hallstage_solver::estimator::whiten::{FieldEquations, Gain, Noise, UNKNOWNS};
 use nalgebra::{DMatrix, DVector};
 
-/// Columns: the unknowns of the fit, the sizes of the faults, and the residual in the last one; a multiple of
-/// four is quick.
+/// Columns: the unknowns of the fit, the sizes of the faults, and last the residual; a multiple of four is quick.
 pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
 pub(super) const RESIDUAL: usize = WIDTH - 1;
 
-/// The priors are so much wider than what magnets and a workshop give: see
+/// Terms of usual magnets from a usual workshop, in parts of their prior in
 /// [`TERMS`](hallstage_solver::estimator::terms::TERMS).
 const USUAL_PART: f64 = 0.5;
-/// E in parts of its prior, over the part that the terms even in u have of theirs: by 60 simulated stages.
-const CARRY_PART: f64 = 0.4;
-/// Terms even in u have at least this part of their prior: the probes stand 2.5 mm off the tilt plane, which
-/// alone makes .03 of E.
+/// E in parts of its prior, over the part of the terms even in u: from 60 simulated stages.
+const E_PART: f64 = 0.4;
+/// Least part of their prior of the terms even in u: the probes stand 2.5 mm off the tilt plane, which alone makes
+/// .03 of E.
 const EVEN_LEAST: f64 = 0.075;
-/// Standard deviation of the lag and of the parameters whose priors are flat, in their units: so far that no log
-/// that shows them feels it.
-const OPEN: f64 = 1e3;
+/// Standard deviation of the lag and of parameters with a flat prior, in their units: so large that no log that
+/// determines them is changed by it.
+const FLAT: f64 = 1e3;
 
 /// Columns of a mean for A, B, C.
 pub(super) type Row = [[f64; WIDTH]; 3];
@@ -35,57 +35,57 @@ pub(super) type Row = [[f64; WIDTH]; 3];
 #[derive(Debug)]
 pub(super) struct Estimate {
     pub(super) parameters: FieldParameters,
-    /// By mean, whitened.
+    /// The whitened rows, by mean.
     pub(super) rows: Vec<Row>,
-    /// What whitened them.
+    /// The gains of the filter that whitens them.
     pub(super) gains: Vec<Gain>,
     /// The curvature, with the prior: the unknowns, then the faults.
     pub(super) squares: DMatrix<f64>,
     pub(super) curvature: Factor,
-    /// The step to the very end, which is too small for a fit but not where parts of a log are compared.
+    /// The last step, too small for a fit but not for a comparison of parts of a log.
     pub(super) step: DVector<f64>,
     /// Sum of squares of the whitened residuals.
     pub(super) chi_squared: f64,
     noise: Noise,
     at: Point,
-    /// Its precision; the mean is zero.
+    /// The precision of the prior; its mean is zero.
     pub(super) prior: DMatrix<f64>,
 }
 
 impl Estimate {
-    /// From a start near the truth, with these faults, under noise as usual.
+    /// From a start near the truth, with these faults and the usual noise.
     pub(super) fn first(
-        log: &Log,
+        means: &Means,
         start: &FieldParameters,
         faults: &[Vec<[f64; 3]>],
     ) -> Option<Self> {
         let values = start.probes.as_flattened();
         let at = Point {
             values: DVector::from_fn(UNKNOWNS, |k, _| values.get(k).copied().unwrap_or(0.0)),
-            offsets: vec![[0.0; 3]; log.means.movements.len()],
+            offsets: vec![[0.0; 3]; means.rows.movements.len()],
         };
         let noise = Noise {
-            white_mm: log.white_mm,
+            white_mm: means.white_mm,
             drift_mm: USUAL_DRIFT_MM,
         };
-        Self::descend(log, start.places, at, noise, faults)
+        Self::descend(means, start.places, at, noise, faults)
     }
 
-    /// Without faults, under the noise that the residuals show.
-    pub(super) fn faultless(self, log: &Log) -> Option<Self> {
+    /// Without faults, with the noise of the residuals.
+    pub(super) fn faultless(self, means: &Means) -> Option<Self> {
         let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
-        let blocks = (log.means).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
+        let blocks = (means.rows).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
         let covariance = self.curvature.inverse();
-        noise.drift_mm = drift_mm(&log.means, &blocks, noise.white_mm, &covariance);
+        noise.drift_mm = drift_mm(&means.rows, &blocks, noise.white_mm, &covariance);
         for (drift_mm, usual_mm) in noise.drift_mm.iter_mut().zip(USUAL_DRIFT_MM) {
             // A free walk swallows faults.
             *drift_mm = drift_mm.min(usual_mm * libm::exp(DRIFT_SPREAD));
         }
-        Self::descend(log, parameters.places, self.at, noise, &[])
+        Self::descend(means, parameters.places, self.at, noise, &[])
     }
 
     fn descend(
-        log: &Log,
+        means: &Means,
         places: [[f64; 2]; 3],
         at: Point,
         noise: Noise,
@@ -94,7 +94,7 @@ impl Estimate {
         let size = UNKNOWNS + faults.len();
         let mut prior = unknowns(&places, [HELD; 2]).prior;
         for k in (0..=COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31) {
-            prior[(k, k)] += 1.0 / (OPEN * OPEN);
+            prior[(k, k)] += 1.0 / (FLAT * FLAT);
         }
         let unknowns = Unknowns {
             origin: DVector::zeros(size),
@@ -103,10 +103,10 @@ impl Estimate {
             ranges: Vec::new(),
         };
         let equations = FieldEquations {
-            rows: &log.means,
+            rows: &means.rows,
             places,
             noise,
-            resets_mm: log.resets_mm,
+            resets_mm: means.resets_mm,
             faults,
         };
         let x = at.values.resize_vertically(size, 0.0);
@@ -129,14 +129,14 @@ impl Estimate {
         })
     }
 
-    /// With columns of faults (changes of the signals, mm) as further unknowns.
-    pub(super) fn with_faults(&self, log: &Log, faults: &[Vec<[f64; 3]>]) -> Option<Self> {
+    /// With effects of faults (changes of the signals, mm) as further unknowns.
+    pub(super) fn with_faults(&self, means: &Means, faults: &[Vec<[f64; 3]>]) -> Option<Self> {
         let places = self.parameters.places;
-        Self::descend(log, places, self.at.clone(), self.noise, faults)
+        Self::descend(means, places, self.at.clone(), self.noise, faults)
     }
 
-    /// Lags of the beams X, Y1, Y2, s, where the faults are what Y1 and Y2 are later than X, ms; 0 where the
-    /// square of one is not so many times its variance.
+    /// Lags of the beams X, Y1, Y2, s. The faults are the lags of Y1 and Y2 behind X, ms. A lag is 0 where its square
+    /// is less than `likely` times its variance.
     pub(super) fn lags_s(&self, likely: f64) -> [f64; 3] {
         let covariance = self.curvature.inverse();
         let sure_s = |(k, unit_s): (usize, f64)| {
@@ -158,18 +158,17 @@ impl Estimate {
         self.at.values.rows(0, UNKNOWNS).into_owned()
     }
 
-    /// How large the faults are.
+    /// The sizes of the faults.
     pub(super) fn sizes(&self) -> &[f64] {
         &self.at.values.as_slice()[UNKNOWNS..]
     }
 
-    /// What a unit of a fault adds to the gradient of the parameters.
-    pub(super) fn pull(&self, fault: usize) -> DVector<f64> {
+    /// The part of a unit of a fault in the gradient of the parameters.
+    pub(super) fn gradient(&self, fault: usize) -> DVector<f64> {
         DVector::from_fn(UNKNOWNS, |k, _| self.squares[(k, UNKNOWNS + fault)])
     }
 
-    /// The curvature of a fit that knows of no faults and has only the first `free` parameters of each
-    /// probe.
+    /// The curvature of a fit without faults, with the first `free` parameters of each probe.
     pub(super) fn without_faults(&self, free: usize) -> Option<Factor> {
         let is_free = |unknown: usize| unknown >= COUNT || unknown % PER_PROBE < free;
         let own = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| match is_free(i) && is_free(j) {
@@ -179,10 +178,10 @@ impl Estimate {
         Factor::new(&own, 0.0)
     }
 
-    /// The parameters and their covariance where terms beyond Model (31) are as large as on a stage of this
-    /// kind, for what a log leaves open of them is what it does to a model without them. A magnet as designed
-    /// has none that are even in u: how large those are that the log shows says how large the others are.
-    pub(super) fn of_this_stage(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    /// The parameters and their covariance with terms beyond Model (31) of the usual size: their uncertainty is the
+    /// error of a model without them. An ideal magnet has no terms even in u. Their fitted size shows how imperfect
+    /// this magnet is.
+    pub(super) fn with_usual_terms(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let powers = |k: usize| TERMS[k % PER_PROBE].powers;
         let is_even = |k: &usize| powers(*k) != [0; 3] && powers(*k)[0].is_multiple_of(2);
         let mut imperfect = USUAL_PART;
@@ -192,7 +191,7 @@ impl Estimate {
             let mut change = DVector::zeros(squares.nrows());
             for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
                 let part = match powers(k) {
-                    [0, 0, 0] => CARRY_PART * imperfect,
+                    [0, 0, 0] => E_PART * imperfect,
                     _ if is_even(&k) => imperfect,
                     _ => USUAL_PART,
                 };
@@ -203,7 +202,7 @@ impl Estimate {
             let factor = Factor::new(&squares, 0.0)?;
             let values = &self.at.values + factor.solve(&change);
             let covariance = factor.inverse();
-            // Squares over the number of terms that the log, not the prior, tells (MacKay 1992).
+            // Squares over the number of terms that the log determines (MacKay 1992).
             let sum =
                 |of: &dyn Fn(usize) -> f64| -> f64 { (0..COUNT).filter(is_even).map(of).sum() };
             let squares = sum(&|k| self.prior[(k, k)] * values[k] * values[k]);

@@ -1,0 +1,358 @@
+//! Faults of channels: score tests on one estimate find them, and their severity is their cost in service.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | `means` | the log in means over a few rows, without spikes |
+//! | `estimate` | the most likely parameters, with faults as further unknowns |
+//! | `effects` | the effect on the Hall signals of every fault that is looked for |
+//! | `score` | the fault that explains the residuals best, with the parameters profiled out |
+//! | `findings` | the faults as findings |
+
+mod effects;
+mod estimate;
+mod findings;
+mod means;
+mod score;
+#[cfg(test)]
+mod service_tests;
+#[cfg(test)]
+mod tests;
+
+use super::limits::{ROUNDS, UNDECIDED};
+use crate::fit::{Repair, with_beams_later};
+use crate::judge::predicted::{Predicted, declared_service};
+use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, severity};
+use effects::{Effects, Shape, Suspect};
+use estimate::Estimate;
+use findings::{changes_often, not_determined};
+use hallstage_input::channel::Channel;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Finding, Quantity, Severity};
+use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::gauss_newton::Factor;
+use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::probe::probes;
+use hallstage_solver::estimator::service::Service;
+use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
+use means::Means;
+use nalgebra::DMatrix;
+use runtime::ModelKind;
+use score::{Fault, Scan, Split, split};
+use std::borrow::Cow;
+
+/// Maximum number of faults of one log.
+const FAULTS_MAX: usize = 6;
+/// Maximum number of repairs per channel. Steps and ramps can follow any other course, but do not describe it.
+const REPAIRS_MAX: usize = 2;
+/// A lag beyond this part of a servo period is taken off before other faults are looked for.
+const LAG_MAX: f64 = 0.5;
+/// Causes are undecided where their gains differ by less than this part: large faults are not quite linear.
+const ALIKE_PART: f64 = 0.01;
+/// A fault below this cost, errors in service over the noise floor, is not reported.
+const COST_MIN: f64 = 1.01;
+
+/// The faults of a log.
+#[derive(Debug, Default)]
+pub struct Faults {
+    /// The faults as findings, each with its cost.
+    pub findings: Vec<Finding>,
+    /// The errors of the calibration in service; `None` for parameters that are not fitted to a log that
+    /// does not determine them.
+    pub predicted: Option<Predicted>,
+    /// The parameters without the faults, and their errors in service, where the faults are clear and this
+    /// makes a good calibration.
+    pub repair: Option<(Repair, Predicted)>,
+    /// The residuals over their noise, after all faults: 1 for a sound log.
+    pub residual: f64,
+}
+
+/// The calibration that a log is judged by.
+#[derive(Clone, Copy, Debug)]
+pub struct Calibrated<'a> {
+    /// The parameters; other models are written as the field model.
+    pub parameters: &'a FieldParameters,
+    /// The parameters that describe the log best: the start of the estimate.
+    pub start: &'a FieldParameters,
+    /// The model.
+    pub model: ModelKind,
+    /// Whether the model describes service and the log determines it without declared errors of the resets.
+    pub is_for_service: bool,
+    /// Whether the parameters are fitted to the rows that are judged.
+    pub is_fitted: bool,
+}
+
+/// The faults in the rows of a log that the tests of the signals leave; `is_bent` if the fit had other rows, too.
+/// `None` where the log is too short or too still for an estimate.
+pub fn find_faults(
+    dataset: &Dataset,
+    stage: &Stage,
+    calibrated: Calibrated,
+    is_bent: bool,
+) -> Option<Faults> {
+    let mut start = *calibrated.start;
+    let mut finder = Finder {
+        dataset: Cow::Borrowed(dataset),
+        stage,
+        calibrated,
+        is_bent,
+        means: Means::new(dataset, stage, &probes(&start)),
+        lags_s: [0.0; 3],
+    };
+    let mut rounds = 0..ROUNDS;
+    let first = loop {
+        let effects = Effects::new(&finder.means, stage, &start, 0.0);
+        let late = [1, 2].map(|beam| effects.constant(Suspect::late(beam)));
+        let first = Estimate::first(&finder.means, &start, &late)?;
+        let beyond_s = first.lags_s(finder.means.per_fault());
+        (0..3).for_each(|beam| finder.lags_s[beam] += beyond_s[beam]);
+        if !beyond_s.iter().any(|lag_s| finder.is_lag(*lag_s)) || rounds.next().is_none() {
+            break first;
+        }
+        // A lag is not linear.
+        let later = with_beams_later(dataset, finder.lags_s, 0.5 * stage.y_baseline_m);
+        start = first.parameters;
+        finder.means = Means::new(&later, stage, &probes(&start));
+        finder.dataset = Cow::Owned(later);
+    };
+    finder.faults(&first.faultless(&finder.means)?)
+}
+
+/// The distance of each value from the middle one.
+fn off_middle(values: [f64; 3]) -> [f64; 3] {
+    let mut sorted = values;
+    sorted.sort_by(f64::total_cmp);
+    values.map(|x| x - sorted[1])
+}
+
+/// A log with the calibration that it is judged by.
+struct Finder<'a> {
+    dataset: Cow<'a, Dataset>,
+    stage: &'a Stage,
+    calibrated: Calibrated<'a>,
+    is_bent: bool,
+    means: Means,
+    /// Lags of the beams X, Y1, Y2, including lags that are already taken off the rows, s.
+    lags_s: [f64; 3],
+}
+
+impl Finder<'_> {
+    /// Log-likelihood gain of a smaller chi-square, with the noise level profiled out: a fault must explain a share
+    /// of the misfit that remains.
+    fn gain(&self, from: f64, to: f64) -> f64 {
+        self.means.freedom() * libm::log(from / to.max(1.0))
+    }
+
+    fn is_lag(&self, lag_s: f64) -> bool {
+        lag_s.abs() > LAG_MAX * self.stage.servo_period_s
+    }
+
+    fn effects(&self, estimate: &Estimate) -> Effects<'_> {
+        let lag_s = estimate.lag_s();
+        Effects::new(&self.means, self.stage, &estimate.parameters, lag_s)
+    }
+
+    /// The estimate with faults among its unknowns.
+    fn refitted(&self, estimate: &Estimate, faults: &[Fault]) -> Option<Estimate> {
+        let effects = self.effects(estimate);
+        let columns = faults
+            .iter()
+            .map(|fault| effects.shaped(fault.suspect, fault.shape));
+        estimate.with_faults(&self.means, &columns.collect::<Vec<_>>())
+    }
+
+    /// The faults, one after the other as long as they explain more than chance, and the estimate with the faults
+    /// among its unknowns; `None` where there are no faults.
+    fn search(&self, faultless: &Estimate) -> Option<(Vec<Fault>, Option<Estimate>)> {
+        let (mut faults, mut last): (Vec<Fault>, Option<Estimate>) = (Vec::new(), None);
+        while faults.len() < FAULTS_MAX {
+            let estimate = last.as_ref().unwrap_or(faultless);
+            let mut found = Scan::new(&self.effects(estimate), estimate)?.faults();
+            found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            let before = estimate.chi_squared;
+            let counts = |gain: f64| self.gain(before, before - gain) > self.means.per_fault();
+            let Some(best) = found.first().filter(|best| counts(best.gain)) else {
+                break;
+            };
+            let near = best.gain - f64::max(UNDECIDED, ALIKE_PART * best.gain);
+            let others = found.iter().filter(|other| other.gain > near);
+            let mut alike: Vec<Channel> = others.map(|other| other.suspect.channel()).collect();
+            alike.retain(|channel| *channel != best.suspect.channel());
+            // Several shapes of one channel may explain the log.
+            alike.sort_unstable();
+            alike.dedup();
+            faults.push(Fault {
+                alike,
+                ..best.clone()
+            });
+            // A large fault bends the effects of the others, too.
+            let next = self.refitted(estimate, &faults);
+            let Some(next) = next.and_then(|next| self.refitted(&next, &faults)) else {
+                // The log can no longer separate it from the others.
+                faults.pop();
+                break;
+            };
+            last = Some(next);
+        }
+        Some((faults, last))
+    }
+
+    /// The curvature of the calibration's own model.
+    fn own_curvature(&self, estimate: &Estimate) -> Option<Factor> {
+        estimate.without_faults(match self.calibrated.model {
+            ModelKind::Field => PER_PROBE,
+            model => Model::from_kind(model).fitted,
+        })
+    }
+
+    fn faults(&self, faultless: &Estimate) -> Option<Faults> {
+        let by = self.calibrated;
+        let declared = declared_service(self.stage, by.parameters, self.means.white_mm)?;
+        let own = self.own_curvature(faultless)?.inverse();
+        let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
+        let is_open = own.worst_ratio() > LIMITED_MAX;
+        // A log that does not determine the calibration shows no fault. Other models are for other service.
+        let decides = is_open && (by.model != ModelKind::Field || by.is_for_service);
+        let (faults, last) = match decides {
+            true => (Vec::new(), None),
+            false => self.search(faultless)?,
+        };
+        let estimate = last.as_ref().unwrap_or(faultless);
+        let residual = (estimate.chi_squared / self.means.freedom()).sqrt();
+        // Two stages are a fault with a known onset that explain more than all faults.
+        let gain = |to: f64, penalty: f64| self.gain(faultless.chi_squared, to) - penalty;
+        let by_faults = faults.len() as f64 * self.means.per_fault();
+        let by_faults = gain(estimate.chi_squared, by_faults).max(0.0);
+        let penalty = COUNT as f64 * self.means.per_unknown();
+        let onsets = faults.iter().filter_map(|fault| fault.shape.onset());
+        let other = split(faultless, onsets);
+        let other =
+            other.filter(|other| gain(faultless.chi_squared - other.gain, penalty) > by_faults);
+        let alone = |finding: Finding, predicted: Predicted| Faults {
+            findings: vec![finding],
+            predicted: Some(predicted),
+            repair: None,
+            residual,
+        };
+        let mut out = if decides && !by.is_fitted {
+            // That is no fault of parameters from another log.
+            Faults {
+                residual,
+                ..Faults::default()
+            }
+        } else if decides {
+            let predicted = self.expected(faultless, &declared, 1.0)?;
+            alone(not_determined(&predicted), predicted)
+        } else if let Some(Split { from, off, .. }) = other {
+            let whole = faultless.curvature.inverse();
+            let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
+            alone(self.other_state(from, predicted.worst_ratio()), predicted)
+        } else {
+            self.priced(&faults, estimate, &declared, residual)?
+        };
+        if is_open && !decides {
+            let open = not_determined(&own).with_severity(Severity::Warn);
+            out.findings.insert(0, open);
+        }
+        Some(out)
+    }
+
+    /// The cost of the faults, and the estimate with the faults as a repair where that is the better calibration.
+    fn priced(
+        &self,
+        faults: &[Fault],
+        estimate: &Estimate,
+        declared: &Service,
+        residual: f64,
+    ) -> Option<Faults> {
+        // Residuals that no fault explains make the parameters less certain.
+        let inflation = residual.max(1.0).powi(2);
+        let predicted = self.expected(estimate, declared, inflation)?;
+        let (own_cost, bent) = (predicted.worst_ratio(), self.own_curvature(estimate)?);
+        let is_felt = |cost: f64| severity(cost) > Severity::Note;
+        let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), self.calibrated.is_fitted);
+        let (mut findings, mut channels) = (Vec::new(), Vec::new());
+        let mut lags_s = self.lags_s;
+        for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
+            let off = bent.solve(&(estimate.gradient(number) * *size));
+            let (known, off) = (DMatrix::zeros(COUNT, COUNT), &off.as_slice()[..COUNT]);
+            let cost = Predicted::new(declared, &known, off).worst_ratio();
+            if is_felt(cost) {
+                is_worth_it = true;
+                // A gain of the reference, or a fault that may be another channel's, does not show the stage.
+                let suspect = fault.suspect;
+                let is_laser = suspect.quantity == Quantity::Gain && suspect.is_beam();
+                is_clear &= fault.alike.is_empty() && !is_laser;
+                channels.push(suspect.channel());
+            }
+            // The lag of a beam that was taken off because of another fault comes back.
+            let back = (0..3).find(|&beam| {
+                (fault.suspect, fault.shape.onset()) == (Suspect::late(beam), None)
+                    && self.is_lag(off_middle(self.lags_s)[beam])
+            });
+            if let Some(beam) = back {
+                lags_s[beam] += 1e-3 * size;
+            } else if cost >= COST_MIN {
+                // A robust fit may have rejected the rows that would have cost more.
+                findings.push(self.finding(fault, *size, cost.min(own_cost)));
+            }
+        }
+        let count = |of: Channel| channels.iter().filter(|other| **other == of).count();
+        if let Some(&channel) = channels.iter().find(|of| count(**of) > REPAIRS_MAX) {
+            is_clear = false;
+            findings.push(changes_often(channel, own_cost));
+        }
+        if let Some((fault, late_ms)) = self.late_beam(lags_s) {
+            // The lag is part of all that bent the fit.
+            findings.insert(0, self.finding(&fault, late_ms, own_cost));
+        }
+        let covariance = estimate.curvature.inverse() * inflation;
+        let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
+        let is_better = is_worth_it
+            && is_clear
+            && expected.worst_ratio() <= GOOD_MAX
+            && self.calibrated.model == ModelKind::Field
+            && (self.is_bent || !findings.is_empty());
+        let repair = Repair {
+            parameters: estimate.parameters,
+            covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
+        };
+        Some(Faults {
+            findings,
+            predicted: Some(predicted),
+            repair: is_better.then_some((repair, expected)),
+            residual,
+        })
+    }
+
+    /// The beam that is late or early against the two others, and its lag, ms.
+    fn late_beam(&self, lags_s: [f64; 3]) -> Option<(Fault, f64)> {
+        let off_s = off_middle(lags_s);
+        let late = (0..3).filter(|&beam| self.is_lag(off_s[beam]));
+        let beam = late.max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
+        let fault = Fault {
+            suspect: Suspect::late(beam),
+            shape: Shape::From(0, self.means.rows.rows.len()),
+            gain: 0.0,
+            alike: Vec::new(),
+        };
+        Some((fault, off_s[beam] * 1e3))
+    }
+
+    /// The errors of the calibration in service: its distance from the estimate, and the covariance of the estimate
+    /// times `inflation`.
+    fn expected(
+        &self,
+        estimate: &Estimate,
+        declared: &Service,
+        inflation: f64,
+    ) -> Option<Predicted> {
+        let (values, covariance) = match self.calibrated.model {
+            ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
+            _ => estimate.with_usual_terms()?,
+        };
+        let own = self.calibrated.parameters.probes.as_flattened();
+        let off: Vec<f64> = own.iter().zip(&values).map(|(a, b)| a - b).collect();
+        Some(Predicted::new(declared, &(covariance * inflation), &off))
+    }
+}

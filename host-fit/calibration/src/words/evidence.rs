@@ -1,0 +1,197 @@
+//! The evidence of a finding: what happened, and how large it is.
+
+use super::causes::mistake;
+use hallstage_input::axis::sign;
+use hallstage_input::finding::{Finding, Kind, Place, Quantity, TimeCourse};
+
+/// Names in a list at most.
+const NAMED_MAX: usize = 10;
+
+/// The sensors of temperature: their place, the symbol of their coefficient, and its key in `[temperature]`.
+pub(super) const SENSORS: [(&str, &str, &str); 2] =
+    [("mount", "k", "magnet"), ("body", "h", "hall")];
+
+/// The evidence, without a capital at its start.
+#[rustfmt::skip]
+pub(super) fn evidence(found: &Finding) -> String {
+    let on = found.channels.first().map_or("", |channel| channel.title());
+    match &found.kind {
+        Kind::SingleRows { first, movements, .. } => {
+            let others = match movements {
+                0 | 1 => String::new(),
+                several => format!(", and so have {} more", several - 1),
+            };
+            format!("movement {first} has one row{others}. It adds nothing to the fit, because its zero deviation fits it exactly")
+        }
+        Kind::FileCut { .. } => "the last line has no line break, so its last number may be cut".to_owned(),
+        Kind::MovementsByTime { movements, split_s, gap_rows, .. } => {
+            let every = split_s.map_or(String::new(), |seconds| format!("every {seconds} s, "));
+            format!("there is no column for the movement. The times separate {movements} movements: one begins {every}after a gap of more than {gap_rows} rows and where the time starts again")
+        }
+        Kind::BetweenCodes { mean_codes, .. } => format!("voltages are {mean_codes:.2} codes from whole codes on average"),
+        Kind::Excerpt { rows, taken, runs } => format!("the fit and the diagnosis use {taken} of {rows} rows, in {runs} runs"),
+        Kind::RowsSkipped { reason, rows, line, column, name, .. } => {
+            format!("rows skipped because of {reason}: {rows} (the first: line {line}, column {column}, {name})")
+        }
+        Kind::MovementsSkipped { movements, rows, .. } => {
+            let names: Vec<String> = movements.iter().map(i64::to_string).collect();
+            format!("all rows of movement {} are bad ({rows})", listed(&names))
+        }
+        Kind::RowsMissing { rows, percent, gaps } => format!("{rows} rows are missing ({percent:.2} %), in {gaps} gaps"),
+        Kind::UnevenTimes { rms_us } => format!("rows come at uneven times, {rms_us:.0} µs rms off an even rate"),
+        Kind::OtherRate { period_us, servo_us, periods } => {
+            let thinned = periods.map_or(String::new(), |periods| format!("the log is thinned to one of {periods} servo periods: "));
+            format!("{thinned}rows are {period_us:.1} µs apart, the servo period in stage.toml is {servo_us:.1} µs")
+        }
+        Kind::IdleMovements { movements, of } => format!("nothing moves in {movements} of {of} movements, so they add nothing to the fit"),
+        Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => format!("{on} never changes"),
+        Kind::Stands { rows, percent, longest_s } | Kind::StandsAtEnd { rows, percent, longest_s } => {
+            format!("{on} stands still in {rows} rows ({percent:.1} % of the log), for up to {longest_s:.3} s at a time")
+        }
+        Kind::OutlierRows { rows, largest_um } => {
+            let rows = format!("{rows} {}", if *rows == 1 { "row is" } else { "rows are" });
+            format!("{rows} far outside the noise of {on}, by up to {largest_um:.1} µm. The default --loss cauchy gives them no weight")
+        }
+        Kind::Hum { frequency_hz, amplitude_um } => format!("{on} hums at {frequency_hz:.1} Hz with an amplitude of {amplitude_um:.2} µm"),
+        Kind::Change { quantity, course, size } => change(found, *quantity, course, *size),
+        Kind::OtherState { log } => {
+            let what = log.as_deref().unwrap_or("the log from here on");
+            format!("{what} does not fit to what comes before: two stages, or everything changed{}", cost(found))
+        }
+        Kind::ChangesOften {} => {
+            format!("{on} changes more than twice. Its course between the changes is unknown, so the calibration is not free of it")
+        }
+        Kind::Inconsistent { ratio } => {
+            format!("the log is inconsistent: the Hall residuals are {ratio:.1} times the noise, and no single fault explains them")
+        }
+        Kind::NotDetermined { ratios: [x, y, rz] } => {
+            format!("the log does not determine the calibration: in service over the range of [motion] in stage.toml, expect errors of {x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")
+        }
+        Kind::FaultsTogether { ratio } => format!("all faults of the log together make errors in service of {ratio:.2} times the noise floor"),
+        Kind::Mistake { causes, is_sure, may_be_magnets, .. } => mistake(causes, *is_sure, *may_be_magnets),
+        Kind::OtherProbes { tolerances } => {
+            format!("the fitted probes differ from stage.toml by {tolerances:.1} times the tolerances of directions, sensitivities and places, and no single mistake explains it")
+        }
+        Kind::LeftOut { rows, of, percent, end: Place { movement, t_us } } => {
+            format!("{rows} of {of} rows ({percent:.1} %) are so far from the fitted model that they count little or nothing in the fit; the last is in movement {movement} at t_us = {t_us}. With --loss none every row counts")
+        }
+        Kind::ShortMovements { mean_rows, hidden_percent } => {
+            format!("the movements have {mean_rows:.1} rows on average. Each has a zero deviation of its own, which hides about {hidden_percent:.0} % of the errors")
+        }
+        Kind::OtherModel { reason, in_service_micro, over_noise } => {
+            let service = in_service_micro.map_or(String::new(), |ranges| {
+                let [x, y, rz] = ranges.map(|[low, high]| format!("{low:.1} to {high:.1}"));
+                format!(". Expect the errors of the log for similar movements; in service expect {x} µm in X, {y} µm in Y, {rz} µrad in Rz")
+            });
+            let noise = over_noise.map_or(String::new(), |ratio| {
+                format!(". Its errors are {ratio:.1} times the noise from row to row: the log shows something that the model lacks")
+            });
+            format!("{reason}{service}{noise}")
+        }
+        Kind::PoorFit { over_noise, best } => {
+            format!("the search ended far from the best fit: its errors are {over_noise:.1} times the noise from row to row, the errors of least squares {best:.1} times")
+        }
+        Kind::NotDescribed { model, error_micro, motion_micro, unit } => {
+            let unit = sign(unit);
+            format!("the fitted model ({model}) does not describe the log: its errors are {error_micro:.1} {unit} rms in {on}, the motion itself has {motion_micro:.1} {unit} rms")
+        }
+        Kind::ZerosClipped { movements, of, largest_um } => {
+            format!("the zero deviation of {movements} of {of} movements is beyond its range (largest {largest_um:.1} µm)")
+        }
+        Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {rows} rows, so they are not part of the errors"),
+        Kind::LateReference { lag_us, periods } => {
+            let (lag_us, periods, way) = (lag_us.abs(), periods.abs(), way(*lag_us));
+            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account")
+        }
+        Kind::AtLimit { parameter, shown: (value, unit), .. } => {
+            format!("the parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})")
+        }
+        Kind::VerticalAtLimit { parameters } => format!("{parameters} of the vertical terms stand at an end of their ranges"),
+        Kind::MovementsMissed { movements } => {
+            format!("the draw has no row of {} movement(s) ({}), so their zero deviations are not fitted, and zero is taken", movements.len(), listed(movements))
+        }
+        Kind::WildRow { micro, unit, ratio } => format!("the largest error, {micro:.1} {} in {on}, is {ratio:.0} times the rms", sign(unit)),
+        Kind::OtherMotion { micro, service_micro, unit, .. } => {
+            let unit = sign(unit);
+            format!("the log moves {on} by {micro:.0} {unit} to either side, service by {service_micro:.0} {unit} ([motion] in stage.toml)")
+        }
+        Kind::BeyondRange { rows, of } => {
+            format!("{rows} of {of} rows are beyond the range of the logs that the parameter blob was fitted to, so the blob extrapolates")
+        }
+        Kind::Coefficients { sensor, percent_per_k, zero_c, span_k, is_field, deviations } => {
+            let (place, symbol, key) = SENSORS[*sensor];
+            let [a, b, c] = percent_per_k.map(|[value, error]| format!("{value:.4}({error:.4})"));
+            let origin = match (*span_k > 0.0, is_field) {
+                (true, _) => format!("from logs {span_k:.1} K apart"),
+                (false, false) => "as stage.toml expects, because only the field model fits it".to_owned(),
+                (false, true) => "as stage.toml expects, because the temperature hardly changes".to_owned(),
+            };
+            let other = deviations.map_or(String::new(), |deviations| {
+                format!(". This is {deviations:.0} standard deviations from `{key}` in [temperature]")
+            });
+            format!("the coefficient {symbol} of A, B, C is {a}, {b}, {c} %/K of the {place} temperature from {zero_c:.2} °C, {origin}{other}")
+        }
+        Kind::NoTemperature { rows, of, reach_k } => {
+            format!("{rows} of {of} rows have no temperature, or one more than {reach_k} K from the calibration, and count as if they had the temperature of the calibration")
+        }
+        Kind::TemperatureChange { sensor, change_k, is_in_movement, .. } => {
+            let since = if *is_in_movement { "within a movement" } else { "since the calibration" };
+            format!("the temperature of the {} changes by {change_k:.1} K {since}", SENSORS[*sensor].0)
+        }
+    }
+}
+
+/// A change of a channel, or of several that explain the log alike.
+fn change(found: &Finding, quantity: Quantity, course: &TimeCourse, size: f64) -> String {
+    let causes = found.channels.iter().chain(&found.alike);
+    let titles: Vec<&str> = causes.map(|channel| channel.title()).collect();
+    let what = match quantity {
+        Quantity::Gain => "gain",
+        Quantity::Zero => "zero",
+        Quantity::Time => "time",
+    };
+    let unit = sign(quantity.unit());
+    let how = match course {
+        TimeCourse::Constant => format!(
+            "is {:.2} {unit} {} the other channels",
+            size.abs(),
+            way(size)
+        ),
+        TimeCourse::Log(log) => format!("in {log} differs by {size:+.2} {unit} from before"),
+        TimeCourse::Onset => format!("changes by {size:+.2} {unit}"),
+        TimeCourse::OverLog => format!("drifts by {size:+.2} {unit} over the log"),
+        TimeCourse::OverMovement => format!("drifts by {size:+.2} {unit}/s within movements"),
+    };
+    let undecided = if titles.len() > 1 {
+        ". The log does not show which"
+    } else {
+        ""
+    };
+    format!(
+        "the {what} of {} {how}{undecided}{}",
+        titles.join(" or "),
+        cost(found)
+    )
+}
+
+/// How something late stands to the others.
+fn way(late: f64) -> &'static str {
+    if late > 0.0 { "behind" } else { "ahead of" }
+}
+
+/// The errors in service that a fault makes by itself.
+fn cost(found: &Finding) -> String {
+    let words = |cost: f64| {
+        format!(". Alone it makes errors in service of {cost:.2} times the noise floor")
+    };
+    found.cost.map_or(String::new(), words)
+}
+
+/// The first names of a list.
+fn listed(names: &[String]) -> String {
+    let shown = &names[..names.len().min(NAMED_MAX)];
+    match names.len() - shown.len() {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
+}
