@@ -78,3 +78,56 @@ fn remedy(found: &Finding) -> String {
     };
     remedy.to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hallstage_input::channel::Channel;
+    use hallstage_input::finding::{Quantity, TimeCourse};
+
+    #[test]
+    fn a_message_has_evidence_with_units_place_alternatives_and_remedy() {
+        let hum = Finding {
+            log: Some("b.csv".to_owned()),
+            sample: Some([10, 20]),
+            ..Finding::new(Kind::Hum {
+                frequency_hz: 50.0,
+                amplitude_um: 2.0,
+            })
+        };
+        assert_eq!(
+            message(&hum.with_channel(Channel::HallA)),
+            "b.csv: Hall A hums at 50.0 Hz with an amplitude of 2.00 µm. This is from 10 of 20 rows. Look for mains (50 or 60 Hz and multiples) in the cable and the supply, or for a vibration."
+        );
+        let (quantity, course) = (Quantity::Gain, TimeCourse::Onset);
+        let gain = Finding::new(Kind::Change {
+            quantity,
+            course,
+            size: -1.0,
+        });
+        let gain = Finding {
+            alike: vec![Channel::Beams],
+            is_repaired: true,
+            ..gain
+                .with_channel(Channel::Halls)
+                .with_place("3", 7)
+                .with_cost(5.0)
+        };
+        assert_eq!(
+            message(&gain),
+            "The gain of all Hall probes or all beams changes by -1.00 %. The log does not show which. Alone it makes errors in service of 5.00 times the noise floor. See movement 3 at t_us = 7. The calibration is free of this fault and describes the stage at the end of the log: zero the stage before use. Let the channel warm up, and check its supply."
+        );
+        let stands = Kind::StandsAtEnd {
+            rows: 5,
+            percent: 100.0,
+            longest_s: 1.0,
+        };
+        let stands = Finding::new(stands).with_channel(Channel::Gap2);
+        assert_eq!(
+            message(&stands),
+            "Capacitive sensor 2 never changes. Is it connected?"
+        );
+        let refused = Finding::new(Kind::CodesRefused { rows: 3 });
+        assert!(message(&refused).ends_with("not part of the errors."));
+    }
+}

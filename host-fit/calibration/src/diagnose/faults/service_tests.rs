@@ -1,11 +1,11 @@
 //! What is predicted of service, against service.
 
-use super::tests::stage;
 use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};
 use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
 use hallstage_input::dataset::Dataset;
+use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;

@@ -11,8 +11,7 @@ use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Severity};
-use hallstage_input::shipped::STAGE_TOML;
-use hallstage_input::stage::Stage;
+use hallstage_input::shipped::stage;
 use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::random::{Purpose, Stream};
@@ -20,10 +19,6 @@ use hallstage_simulate::recording::{Recording, Sample, record};
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::probe::probes;
-
-pub(super) fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
-}
 
 /// Three movements of 8 s, all axes moving.
 fn recording(seed: u64) -> Recording {

@@ -6,8 +6,7 @@ use crate::fit::{FitSettings, ModelChoice, fit};
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Severity};
-use hallstage_input::shipped::STAGE_TOML;
-use hallstage_input::stage::Stage;
+use hallstage_input::shipped::stage;
 use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::random::{Purpose, Stream};
@@ -18,10 +17,6 @@ use std::ops::Range;
 /// Rows of each of its movements, and their servo period, s.
 pub(super) const ROWS: usize = 2000;
 pub(super) const PERIOD_S: f64 = 0.002;
-
-pub(super) fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("a sound stage")
-}
 
 /// Three movements of 4 s, all axes moving.
 pub(super) fn recording() -> Recording {

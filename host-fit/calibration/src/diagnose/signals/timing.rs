@@ -68,49 +68,30 @@ mod tests {
         (found[0].code(), found[0].severity, value)
     }
 
-    /// One row of `count` is missing.
-    fn without_one_of(count: usize) -> Dataset {
-        let sound = dataset(&recording());
-        let mut gappy = sound.clone();
-        let mut rows = sound.rows.into_iter().enumerate();
-        gappy.rows.clear();
-        for movement in &mut gappy.movements {
-            let (start, all) = (gappy.rows.len(), movement.rows.len());
-            let kept = rows.by_ref().take(all);
-            let kept = kept.filter(|(k, _)| k % count != count / 2);
-            gappy.rows.extend(kept.map(|(_, row)| row));
-            movement.rows = start..gappy.rows.len();
-        }
-        gappy.logs[0].rows = 0..gappy.rows.len();
-        gappy
-    }
-
-    /// With this many servo periods from row to row.
-    fn every(periods: f64) -> Dataset {
-        let mut dataset = dataset(&recording());
-        for movement in dataset.movements.clone() {
-            for (k, row) in dataset.rows[movement.rows].iter_mut().enumerate() {
-                row.t_us = (k as f64 * periods * PERIOD_S * 1e6) as i64;
-            }
-        }
-        dataset
-    }
-
     #[test]
     fn missing_rows_are_counted_and_many_a_warning() {
-        let found = [200, 50].map(|count| only(&without_one_of(count)));
-        let missing = |severity, rows| (Code::RowsMissing, severity, rows);
-        assert_eq!(
-            found,
-            [
-                missing(Severity::Note, 30.0),
-                missing(Severity::Warn, 120.0)
-            ]
-        );
+        let sound = dataset(&recording());
+        for (one_of, severity, missing) in
+            [(200, Severity::Note, 30.0), (50, Severity::Warn, 120.0)]
+        {
+            let mut gappy = sound.without(&[]);
+            gappy.rows.clear();
+            for movement in &mut gappy.movements {
+                let start = gappy.rows.len();
+                let kept = movement
+                    .rows
+                    .clone()
+                    .filter(|row| row % one_of != one_of / 2);
+                gappy.rows.extend(kept.map(|row| sound.rows[row]));
+                movement.rows = start..gappy.rows.len();
+            }
+            gappy.logs[0].rows = 0..gappy.rows.len();
+            assert_eq!(only(&gappy), (Code::RowsMissing, severity, missing));
+        }
     }
 
     #[test]
-    fn uneven_times_are_reported_in_us() {
+    fn uneven_times_and_another_rate_are_warnings_and_the_rate_of_a_thinned_log_a_note() {
         let mut random = Stream::new(7, Purpose::Sensors, 0);
         let mut uneven = dataset(&recording());
         for row in &mut uneven.rows {
@@ -119,16 +100,18 @@ mod tests {
         let (code, severity, rms_us) = only(&uneven);
         assert_eq!((code, severity), (Code::Jitter, Severity::Warn));
         assert!((80.0..93.0).contains(&rms_us), "{rms_us}");
-    }
-
-    #[test]
-    fn another_rate_is_a_warning_and_that_of_a_thinned_log_a_note() {
         for (periods, severity) in [
             (0.5, Severity::Warn),
             (5.5, Severity::Warn),
             (4.0, Severity::Note),
         ] {
-            let (code, found, period_us) = only(&every(periods));
+            let mut every = dataset(&recording());
+            for movement in every.movements.clone() {
+                for (k, row) in every.rows[movement.rows].iter_mut().enumerate() {
+                    row.t_us = (k as f64 * periods * PERIOD_S * 1e6) as i64;
+                }
+            }
+            let (code, found, period_us) = only(&every);
             assert_eq!((code, found), (Code::Jitter, severity), "{periods}");
             assert!((period_us - 2000.0 * periods).abs() < 0.1, "{period_us}");
         }
