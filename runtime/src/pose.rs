@@ -18,6 +18,13 @@
 
 use crate::real::Real;
 
+/// `f` of each of three numbers with its counterpart. It is for code of every tick: at opt-level "s"
+/// `array::from_fn` and nalgebra's operators become loops of three times the instructions.
+#[inline(always)]
+pub(crate) fn pairwise(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) -> [f32; 3] {
+    [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
+}
+
 /// Motion in the plane, by the Hall probes: X and Y in m, Rz in rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

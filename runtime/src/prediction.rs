@@ -16,9 +16,8 @@
 
 use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;
-use crate::pose::PlanarPose;
+use crate::pose::{PlanarPose, pairwise};
 use crate::tracker::PoseTracker;
-use nalgebra::Vector3;
 
 /// Poses through which the line is laid.
 pub const POSES: usize = 8;
@@ -26,7 +25,7 @@ pub const POSES: usize = 8;
 /// A valid planar pose and when its codes were sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sample {
-    pose: Vector3<f32>,
+    pose: [f32; 3],
     time_us: u32,
 }
 
@@ -67,7 +66,7 @@ impl Predictor {
     /// and the longest time between two poses in a row: one or two servo periods.
     pub const fn new(age_max_us: u16) -> Self {
         let nothing = Sample {
-            pose: Vector3::new(0.0, 0.0, 0.0),
+            pose: [0.0; 3],
             time_us: 0,
         };
         Self {
@@ -105,7 +104,7 @@ impl Predictor {
             self.taken = 0;
         }
         let new = Sample {
-            pose: Vector3::from(pose.to_array()),
+            pose: pose.to_array(),
             time_us: frame.time_us,
         };
         self.samples = [b, c, d, e, f, g, last, new];
@@ -133,17 +132,18 @@ impl Predictor {
             sum_back_us = sum_back_us.wrapping_add(back_us(sample));
         }
         // 8 (t_k - t_mean) in us, below 2^24: exact in integers and in `f32`.
-        let (mut squares, mut slope) = (0.0f32, Vector3::zeros());
+        let (mut squares, mut slope) = (0.0f32, [0.0f32; 3]);
         for sample in &self.samples {
             let weight = sum_back_us.wrapping_sub(8 * back_us(sample)) as i32 as f32;
             squares += weight * weight;
-            slope += (sample.pose - last.pose) * weight;
+            let moved = pairwise(sample.pose, last.pose, |then, now| weight * (then - now));
+            slope = pairwise(slope, moved, |sum, moved| sum + moved);
         }
         let ahead = (8 * age_us) as f32 / squares;
-        let pose = last.pose + slope * ahead;
+        let pose = pairwise(last.pose, slope, |now, slope| now + ahead * slope);
         pose.iter()
             .all(|q| q.is_finite())
-            .then(|| PlanarPose::from_array(pose.into()))
+            .then(|| PlanarPose::from_array(pose))
     }
 }
 

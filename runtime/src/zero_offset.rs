@@ -8,7 +8,7 @@
 //! lifted or tilted, or when a pose lies outside the calibrated range.
 
 use crate::decoder::Reading;
-use crate::pose::PlanarPose;
+use crate::pose::{PlanarPose, pairwise};
 use crate::status::Status;
 
 /// How long to average, and what still counts as rest at the zero.
@@ -224,13 +224,6 @@ impl ZeroOffsetRun {
 
 /// Either half of the pose lies outside the calibrated range.
 const EXTRAPOLATED: Status = Status::PLANAR_EXTRAPOLATED.with(Status::VERTICAL_EXTRAPOLATED);
-
-/// `f` of each of three numbers with its counterpart, written out: `array::from_fn` becomes a loop at
-/// opt-level "s".
-#[inline(always)]
-fn pairwise(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) -> [f32; 3] {
-    [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
-}
 
 /// The first of three values above its limit in magnitude, with its index. It is called four times
 /// off the tick, so it is not inlined.
