@@ -105,14 +105,21 @@ fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
 fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
     let mut bench = Bench::new(Some(KEY));
     let off = Request::ServoOff { seconds: 1 };
-    assert_eq!(bench.ask_tagged(off, 7), DONE);
+    let nonce = bench.nonce();
+    let recorded = tag(&KEY, &nonce, &Command::new(off, 7), &[]);
+    bench.tag(7, recorded);
+    assert_eq!(bench.ask(off, 7), DONE);
     assert!(bench.service.servo_is_off());
     bench.rest();
     assert_eq!(bench.ask(off, 7), DONE);
     assert!(!bench.service.servo_is_off());
-    bench.nonce();
+    // The next challenge has another nonce, which the recorded tag does not answer.
+    assert_ne!(bench.nonce(), nonce);
     let incomplete = (Outcome::Incomplete, TAG_INDEX.into());
     assert_eq!(bench.ask(off, 7), incomplete);
+    bench.tag(7, recorded);
+    assert_eq!(bench.ask(off, 7), NOT_AUTHORISED);
+    assert!(!bench.service.servo_is_off());
 }
 
 #[test]
