@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
-use crate::estimator::linear::point_of;
 use crate::estimator::model::Model;
 use crate::estimator::synthetic::Protocol;
 use hallstage_input::shipped::stage;

@@ -181,7 +181,6 @@ mod tests {
     use super::*;
     use crate::estimator::sample_for_tests::parameters;
     use crate::estimator::terms::TERMS;
-    use runtime::matrix::to_rows;
 
     const PLANAR_MM: [f64; 3] = [0.31, -0.42, 0.23];
     const VERTICAL: [f64; 3] = [180e-6, -390e-6, 270e-6];

@@ -58,7 +58,7 @@ pub struct Sandwich {
 struct Errors {
     inverse: Square,
     undetermined: Vec<usize>,
-    clustered: [Option<f64>; UNKNOWNS],
+    clustered: [f64; UNKNOWNS],
     independent: [f64; UNKNOWNS],
 }
 
@@ -68,7 +68,9 @@ impl Sandwich {
         let sums = Sums::new(problem, parameters)?;
         let free = problem.free();
         let errors = sums.errors(&free);
-        let standard_error = |k: usize| errors.standard_error(k);
+        // Fewer clusters than parameters do not separate them.
+        let is_enough = sums.clusters > free.len();
+        let standard_error = |k: usize| errors.standard_error(k).filter(|_| is_enough);
         let determined: Vec<usize> = (free.iter().copied())
             .filter(|&k| standard_error(k).is_some())
             .collect();
@@ -105,7 +107,7 @@ impl Sandwich {
 impl Errors {
     /// The larger of both; `None` for an unknown that the log does not determine.
     fn standard_error(&self, k: usize) -> Option<f64> {
-        let largest = self.independent[k].max(self.clustered[k]?);
+        let largest = self.independent[k].max(self.clustered[k]);
         (!self.undetermined.contains(&k) && largest.is_finite()).then_some(largest)
     }
 }
@@ -216,17 +218,14 @@ impl Sums {
         let mut errors = Errors {
             inverse,
             undetermined,
-            clustered: [None; UNKNOWNS],
+            clustered: [0.0; UNKNOWNS],
             independent: [0.0; UNKNOWNS],
         };
         for &k in free {
             let row = inverse.row(k);
             let error = |meat: &Square| ((row * meat * row.transpose())[0] * scale).sqrt();
             errors.independent[k] = error(&self.independent);
-            // Fewer clusters than unknowns say nothing of some of them.
-            if self.clusters > free.len() {
-                errors.clustered[k] = Some(error(&self.clustered));
-            }
+            errors.clustered[k] = error(&self.clustered);
         }
         errors
     }

@@ -1,6 +1,5 @@
 use super::*;
 use crate::estimator::model::Model;
-use crate::estimator::synthetic::Protocol;
 use crate::solve::{Projection, Solver, SolverOptions};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, STAGE_TOML};
