@@ -4,9 +4,9 @@ import sys
 
 from bus import Table, frames
 
+ANSWER = 0x1F0
 table = Table(sys.argv[1])
-decoded = (table.decode(frame) for frame in frames(sys.argv[2]))
-answers = [s for name, s in filter(None, decoded) if name == "Answer"]
+answers = [table.decode(frame)[1] for frame in frames(sys.argv[2]) if frame.arbitration_id == ANSWER]
 found = [(s["Command"], s["Token"], s["Outcome"]) for s in answers]
 print(found)
 sys.exit(found != [(2, int(sys.argv[3]), 0)])
