@@ -1,12 +1,14 @@
-//! The sentences: every finding and every refusal becomes words here, for terminals, pages, JSON and Python alike.
+//! The sentences: every finding, verdict and refusal becomes words here, for terminals, pages, JSON and Python alike.
 
 mod causes;
 mod evidence;
 mod finding;
 mod refusal;
+mod verdict;
 
 pub use finding::message;
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
+pub use verdict::verdict;
 
 use hallstage_input::finding::{Finding, Severity};
 use serde::ser::SerializeStruct;

@@ -5,7 +5,7 @@ use super::table::Table;
 use super::text::as_text;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
-use hallstage_calibration::judge::predicted::{Predicted, Validity};
+use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
 use hallstage_calibration::words;
@@ -79,7 +79,7 @@ impl Summary {
         Self {
             mark,
             word,
-            sentence: sentence(of, predicted),
+            sentence: sentence(of),
             axes: axes(of, predicted),
             next: next(of, verdict),
         }
@@ -104,44 +104,11 @@ impl Summary {
     }
 }
 
-/// What the verdict means.
-fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
-    match (of.end, predicted) {
-        (End::Failed(refusal), _) => words::refusal(refusal, &of.diagnosis.findings),
-        (_, Some(predicted)) if of.is_field => {
-            let ratio = predicted.worst_ratio();
-            let repaired = match of.diagnosis.repair {
-                Some(_) => "; errors on the log still have the faults that are taken off",
-                None => "",
-            };
-            let within = match &of.diagnosis.validity {
-                None => String::new(),
-                Some(Validity {
-                    within_k,
-                    is_followed: true,
-                }) => format!("; good within {within_k:.0} K of the temperature of calibration"),
-                Some(Validity { within_k, .. }) => format!(
-                    "; good within {within_k:.1} K of the temperature of calibration, which was not logged"
-                ),
-            };
-            format!(
-                "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}"
-            )
-        }
-        (_, Some(predicted)) => {
-            let [x, y, rz] = predicted.range.map(|ends| ends.map(|end| end * 1e6));
-            let range = |[low, high]: [f64; 2]| match high > 1.05 * low {
-                true => format!("{low:.1} to {high:.1}"),
-                false => format!("{high:.1}"),
-            };
-            format!(
-                "for movements like the log; in service expect {} µm in X, {} µm in Y, {} µrad in Rz",
-                range(x),
-                range(y),
-                range(rz)
-            )
-        }
-        (_, None) => "the log does not show the errors in service".to_owned(),
+/// The meaning of the verdict.
+fn sentence(of: &Subject) -> String {
+    match of.end {
+        End::Failed(refusal) => words::refusal(refusal, &of.diagnosis.findings),
+        _ => words::verdict(of.diagnosis, of.is_field),
     }
 }
 
@@ -212,6 +179,7 @@ fn next(of: &Subject, verdict: Option<Verdict>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hallstage_calibration::judge::predicted::Validity;
     use hallstage_calibration::judge::statistics::AxisError;
     use hallstage_input::finding::{Finding, Kind};
 

@@ -56,7 +56,7 @@ const SIDES: [[Code; 2]; 3] = [
 pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     let half_m = 0.5 * stage.y_baseline_m;
     let beams = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, half_m, 0.0, 1.0, -half_m);
-    let gaps = of_gaps(&stage.capacitive_probes_m);
+    let gaps = pose_to_gaps(&stage.capacitive_probes_m);
     let sides = [Matrix3::identity(), beams, gaps].into_iter().enumerate();
     let mut out = Vec::new();
     for (side, to_channels) in sides.take(2 + usize::from(has_codes)) {
@@ -148,7 +148,7 @@ const fn penalty(is_usual: bool) -> f64 {
 fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     let designed = stage.capacitive_probes_m;
     let mut add = |correction, value, penalty, places: ProbePositions<f64>| {
-        out.extend(of_gaps(&places).try_inverse().map(|to_pose| Mistake {
+        out.extend(pose_to_gaps(&places).try_inverse().map(|to_pose| Mistake {
             value,
             penalty,
             ..mistake(
@@ -207,7 +207,7 @@ pub(super) fn cause(alike: &[&Mistake]) -> Cause {
 }
 
 /// Gap changes 1, 2, 3 of a vertical pose Z, Rx, Ry: z + rx y - ry x.
-fn of_gaps(positions: &ProbePositions<f64>) -> Matrix3<f64> {
+fn pose_to_gaps(positions: &ProbePositions<f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| {
         let [x, y] = positions[i];
         [1.0, y, -x][j]

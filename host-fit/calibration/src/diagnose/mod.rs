@@ -94,7 +94,7 @@ pub fn diagnose_log(
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
-    let own = Described::by_fit(fitted, stage);
+    let own = Described::from_fit(fitted, stage);
     let better = fitted.ok();
     let better = better.and_then(|fit| Described::better(fit, dataset, stage));
     let (best, poor) = better.map_or((own, None), |(best, poor)| (best, Some(poor)));
@@ -157,7 +157,7 @@ struct Described {
 
 impl Described {
     /// The parameters of a fit, or of the drawing where there is no fit.
-    fn by_fit(fitted: Result<&Fit, &FitError>, stage: &Stage) -> Self {
+    fn from_fit(fitted: Result<&Fit, &FitError>, stage: &Stage) -> Self {
         let of_31 = |parameters| FieldParameters::from_model_31(parameters, stage);
         match fitted {
             Ok(fit) => Self {
@@ -186,7 +186,7 @@ impl Described {
         let best_fit = fit(dataset, stage, &FitSettings::new(model)).ok()?;
         let best = fit_checks::over_noise(&best_fit, best_fit.rows(dataset));
         let found = Finding::new(Kind::PoorFit { over_noise, best });
-        (POOR_MIN * best < over_noise).then(|| (Self::by_fit(Ok(&best_fit), stage), found))
+        (POOR_MIN * best < over_noise).then(|| (Self::from_fit(Ok(&best_fit), stage), found))
     }
 }
 

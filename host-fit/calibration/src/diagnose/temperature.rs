@@ -19,7 +19,7 @@ const REZERO_K: f64 = 5.0;
 
 /// A coefficient is wrong if it is this many standard deviations from the value in the stage file.
 const DEVIATIONS_MAX: f64 = 4.0;
-/// Largest share of rows without a temperature with which k and h can be fitted.
+/// Largest share of rows without a temperature for a fit of k and h.
 const MISSING_MAX: f64 = 0.01;
 
 /// The fitted k and h, a finding for each sensor. The cost is the error in service from the drift of the temperature in

@@ -10,21 +10,21 @@ use hallstage_solver::estimator::paper::{Parameters, THETA, search_box};
 use hallstage_solver::estimator::sandwich::Sandwich;
 use nalgebra::Vector3;
 
-/// An axis moves when its span is at least this many times its noise from sample to sample: a
-/// million samples of noise alone span ten times its standard deviation.
+/// An axis moves if its span is at least this many times its noise from row to row: a million rows of noise span ten
+/// standard deviations.
 const SPAN_TO_NOISE_MIN: f64 = 20.0;
-/// An axis or probe that spans more than this (m or rad) moves, however coarsely it was sampled:
-/// far apart, samples of a motion differ as those of noise do.
+/// An axis or probe with a larger span (m or rad) moves, even if it is sampled so coarsely that its motion looks like
+/// noise.
 const SPAN_OF_MOTION: f64 = 20e-6;
-/// A parameter is determined when the error that the motion allows is below this part of its search range.
+/// A parameter is determined if its error is below this part of its search range.
 const ERROR_TO_RANGE_MAX: f64 = 0.1;
-/// The model describes the log when its rms errors are below this part of the rms motion: the
-/// vertical terms that (30) lacks cost it less than a tenth.
+/// The model describes the log if its rms errors are below this part of the rms motion: the vertical terms that Model
+/// (30) lacks cost less than a tenth.
 const ERROR_TO_MOTION_MAX: f64 = 0.2;
-/// Without sensitivity or zero deviations a model may miss much, but not more than there is.
+/// The same for models without sensitivity or zero deviations.
 const ERROR_TO_MOTION_MAX_BASELINE: f64 = 1.0;
 
-/// What a log lacks, or what is wrong with a fit to it.
+/// Why a log has no fit, or why a fit is of no use.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitFailure {
     /// Fewer rows than unknowns.
@@ -68,7 +68,7 @@ pub enum FitFailure {
         /// Its noise from sample to sample, um.
         noise_micro: f64,
     },
-    /// The log moves, but not so that these parameters show.
+    /// The motion of the log does not determine these parameters.
     #[error("the log does not determine {what}: {remedy}")]
     NotDetermined {
         /// The parameters, with their standard errors where there are any.
@@ -76,11 +76,11 @@ pub enum FitFailure {
         /// What to record.
         remedy: String,
     },
-    /// The fitted model leaves most of the motion unexplained.
+    /// The fitted model explains too little of the motion.
     #[error(
-        "the fitted model ({model}) is wrong by {error_micro:.1} {unit} rms in {axis} where the motion itself has \
-         {motion_micro:.1} {unit} rms: it does not describe this log. Check the column mapping, the order and signs \
-         of the sensors and the scales in stage.toml, and record a log in which the stage moves along {axis}",
+        "the fitted model ({model}) does not describe this log: its errors are {error_micro:.1} {unit} rms in {axis}, \
+         the motion itself has {motion_micro:.1} {unit} rms. Check the columns, the order and signs of the sensors \
+         and the scales in stage.toml, and record a log where the stage moves along {axis}",
         axis = motion.axis(), unit = motion.micro_unit()
     )]
     NotDescribed {
@@ -95,7 +95,7 @@ pub enum FitFailure {
     },
 }
 
-/// Refuses a log in which an axis that the model needs does not move, or a probe does not see it.
+/// Refuses a log without motion in an axis that the model needs, or with a probe that does not follow the motion.
 ///
 /// # Errors
 /// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::DeadProbe`] for the first such
@@ -214,7 +214,7 @@ fn tolerable(id: &ParameterId, vertical_span: [f64; 3]) -> f64 {
     }
 }
 
-/// Refuses a fit whose parameters the log leaves open; `vertical_span` is the largest magnitude
+/// Refuses a fit with parameters that the log does not determine; `vertical_span` is the largest magnitude
 /// of Z, Rx, Ry in the log (m, rad, rad).
 ///
 /// # Errors
@@ -268,7 +268,7 @@ pub fn check_determined(
     })
 }
 
-/// Refuses a fit that leaves most of the motion unexplained.
+/// Refuses a fit that explains too little of the motion.
 ///
 /// # Errors
 /// [`FitFailure::NotDescribed`] for the first such axis.

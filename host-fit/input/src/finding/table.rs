@@ -23,15 +23,15 @@ pub struct Entry {
     pub name: &'static str,
     /// Severity, unless a size decides.
     pub severity: Severity,
-    /// What it is.
+    /// Its meaning.
     pub meaning: &'static str,
-    /// What to do about it.
+    /// Its remedy.
     pub remedy: &'static str,
     /// Findings that are consequences of this code and are hidden beside it.
     pub hides: &'static [Code],
     /// Whether the prediction for service holds beside it.
     pub trust: Trust,
-    /// The least severity from which it explains why a fit fails; `None` if it never does.
+    /// The least severity that explains a failed fit; `None` if no severity does.
     pub explains_from: Option<Severity>,
 }
 
@@ -41,7 +41,7 @@ macro_rules! codes {
         [$($hidden:ident)*], $trust:ident, $explains:expr;)*) => {
         /// What was found. Names are stable.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        #[expect(missing_docs, reason = "TABLE says what each one is")]
+        #[expect(missing_docs, reason = "TABLE describes them")]
         pub enum Code { $($code,)* }
 
         /// One row for each code, in the order of [`Code`].
@@ -61,8 +61,8 @@ macro_rules! codes {
 const WARN: Option<Severity> = Some(Severity::Warn);
 const ALWAYS: Option<Severity> = Some(Severity::Note);
 
-// Code, name, usual severity, what it is, what to do, the codes that it hides, whether the prediction holds
-// beside it, and from which severity it explains a fit that fails.
+// Code, name, usual severity, meaning, remedy, hidden codes, trust in the prediction, and the least severity that
+// explains a failed fit.
 #[rustfmt::skip]
 codes! {
     ChannelsSwapped, "channels_swapped", Refuse, "two Hall channels are exchanged", "check wires, column order and stage.toml", [], Kept, WARN;

@@ -15,7 +15,7 @@ use hallstage_solver::estimator::model::Model;
 use runtime::ModelKind;
 
 /// A log of a stage by a protocol.
-fn of_protocol(stage: &Stage, seed: u64, protocol: Protocol) -> Dataset {
+fn log_by_protocol(stage: &Stage, seed: u64, protocol: Protocol) -> Dataset {
     let drift_per_root_s = match protocol {
         Protocol::Service => [0.0; 3],
         _ => SensorErrors::USUAL.drift_per_root_s,
@@ -36,10 +36,10 @@ fn in_service(
     protocol: Protocol,
     choice: ModelChoice,
 ) -> (Fit, Diagnosis, [f64; 3]) {
-    let dataset = of_protocol(stage, seed, protocol);
+    let dataset = log_by_protocol(stage, seed, protocol);
     let fitted = fit(&dataset, stage, &FitSettings::new(choice)).expect("a fit");
     let diagnosis = diagnose_log(&dataset, stage, Ok(&fitted));
-    let service = of_protocol(stage, seed, Protocol::Service);
+    let service = log_by_protocol(stage, seed, Protocol::Service);
     let judgement = Decoded::new(&fitted.set, &service).judge(&service, stage, Zeros::None);
     let rms = judgement.errors.axes.map(|axis| axis.rms);
     (fitted, diagnosis, rms)

@@ -30,7 +30,7 @@ fn recording(seed: u64) -> Recording {
 }
 
 /// The diagnosis of the first rows of a recording.
-fn of_start(recording: &Recording, rows: usize) -> Diagnosis {
+fn diagnosis_of_start(recording: &Recording, rows: usize) -> Diagnosis {
     let stage = stage();
     let mut recording = recording.clone();
     recording.movements.truncate(1);
@@ -42,13 +42,13 @@ fn of_start(recording: &Recording, rows: usize) -> Diagnosis {
 
 #[test]
 fn a_short_log_is_never_good_and_refused_where_it_leaves_the_field_model_open() {
-    let short = of_start(&recording(3), 1000);
+    let short = diagnosis_of_start(&recording(3), 1000);
     assert!(matches!(
         short.verdict,
         Some(Verdict::Limited | Verdict::Refused)
     ));
     assert!(short.predicted.expect("figures").worst_ratio() > 5.0);
-    let longer = of_start(&recording(4), 2000);
+    let longer = diagnosis_of_start(&recording(4), 2000);
     assert_eq!(longer.verdict, Some(Verdict::Refused));
     assert_eq!(longer.findings[0].code(), Code::NotDetermined);
 }

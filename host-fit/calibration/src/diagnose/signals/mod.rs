@@ -44,14 +44,17 @@ pub fn signal_findings(
     let (mut findings, mut bad) = (Vec::new(), Vec::new());
     for log in 0..dataset.logs.len() {
         let mut signals = LogSignals::new(dataset, stage, log);
-        findings.extend(of_log(&mut signals, fitted));
+        findings.extend(log_findings(&mut signals, fitted));
         let unused = (0..signals.rows.len()).filter(|&row| !signals.usable[row]);
         bad.extend(unused.map(|row| signals.source.rows.start + row));
     }
     (findings, bad)
 }
 
-fn of_log(log: &mut LogSignals, (parameters, lag_s): (&FieldParameters, f64)) -> Vec<Finding> {
+fn log_findings(
+    log: &mut LogSignals,
+    (parameters, lag_s): (&FieldParameters, f64),
+) -> Vec<Finding> {
     let mut found = timing::timing(log);
     found.extend(still::idle(log));
     found.extend(still::repeats(log));

@@ -75,7 +75,7 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
 
 pub(super) fn found(dataset: &Dataset) -> Vec<Finding> {
     let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
-    let by = Described::by_fit(fitted.as_ref(), &stage());
+    let by = Described::from_fit(fitted.as_ref(), &stage());
     signal_findings(dataset, &stage(), (&by.parameters, by.lag_s)).0
 }
 

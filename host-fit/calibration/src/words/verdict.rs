@@ -1,0 +1,35 @@
+//! The meaning of a verdict.
+
+use crate::diagnose::Diagnosis;
+
+/// The errors in service, and how far from the temperature of the log they hold; `is_field` for the field model, which is
+/// made for service.
+pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
+    let Some(predicted) = &diagnosis.predicted else {
+        return "the log does not show the errors in service".to_owned();
+    };
+    if !is_field {
+        let range = |[low, high]: [f64; 2]| match high > 1.05 * low {
+            true => format!("{:.1} to {:.1}", low * 1e6, high * 1e6),
+            false => format!("{:.1}", high * 1e6),
+        };
+        let [x, y, rz] = predicted.range.map(range);
+        return format!(
+            "for movements like the log; in service expect {x} µm in X, {y} µm in Y, {rz} µrad in Rz"
+        );
+    }
+    let ratio = predicted.worst_ratio();
+    let repaired = match diagnosis.repair {
+        Some(_) => "; errors on the log include its faults, the calibration is free of them",
+        None => "",
+    };
+    let within = diagnosis.validity.map_or(String::new(), |validity| {
+        let (digits, logged) = match validity.is_followed {
+            true => (0, ""),
+            false => (1, ", which was not logged"),
+        };
+        let within_k = validity.within_k;
+        format!("; good within {within_k:.digits$} K of the temperature of calibration{logged}")
+    });
+    format!("errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}")
+}
