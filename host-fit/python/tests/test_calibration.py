@@ -246,7 +246,7 @@ def test_ctrl_c_ends_a_search_that_shows_how_far_it_is_and_the_next_fit_works(
     timer = threading.Timer(1.5, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        hs.fit(paper, model="31", solver="de", project="none", generations=10_000_000)
+        hs.fit(paper, model="31", solver="shtlbo", project="none", generations=10_000_000)
     shown = capsys.readouterr().err
     assert " % " in shown and shown.endswith("\r")
     assert hs.fit(run30).verdict == "good"
