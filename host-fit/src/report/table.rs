@@ -20,6 +20,9 @@ pub struct Table {
     pub decimals: Option<usize>,
 }
 
+/// Title of the first column, name of the row, and its figures by the titles of their columns.
+type NamedRow = (String, String, Vec<(String, Figure)>);
+
 /// A table as texts.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Cells {
@@ -59,8 +62,8 @@ impl Table {
         Self::from_rows(title, rows.collect())
     }
 
-    /// Rows of head, name and figures by the titles of their columns.
-    fn from_rows(title: &str, rows: Vec<(String, String, Vec<(String, Figure)>)>) -> Self {
+    /// A table of these rows, which need not have the same columns.
+    fn from_rows(title: &str, rows: Vec<NamedRow>) -> Self {
         let head = rows
             .first()
             .map_or(String::new(), |(head, ..)| head.clone());
@@ -70,7 +73,7 @@ impl Table {
                 columns.push(name.clone());
             }
         }
-        let row = |(_, name, figures): (String, String, Vec<(String, Figure)>)| {
+        let row = |(_, name, figures): NamedRow| {
             let cell = |column: &String| {
                 let found = figures.iter().find(|(name, _)| name == column);
                 found.map_or(Figure::None, |(_, figure)| figure.clone())
