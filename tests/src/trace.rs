@@ -20,8 +20,6 @@ pub struct Counts {
     pub most: u64,
     /// Most divisions of a call.
     pub divisions: u64,
-    /// Most cycles of a call, estimated: see [`Instruction::cycles`].
-    pub cycles: u64,
     /// Instructions of the function's callees, over all calls.
     pub in_callees: u64,
 }

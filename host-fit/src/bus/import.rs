@@ -7,7 +7,7 @@
 //! | the time of each tick's sample, by the clock of the node | `node_clock` |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
 //! | offset and difference in speed of the clocks, from the motion | [`offset`] |
-//! | the reference at the times of the ticks | [`join`] |
+//! | the reference at the times of the ticks | [`join`](mod@join) |
 
 pub mod bus_log;
 mod bus_reader;

@@ -38,7 +38,7 @@ pub(super) struct PlanArgs {
     json: Json,
 }
 
-/// Plans a run within the limits of [motion] in the stage file, and writes trajectory and JSON.
+/// Plans a run within the limits of `[motion]` in the stage file, and writes trajectory and JSON.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
     super::check_outputs(outputs, None, [args.stage.path.as_path()])?;

@@ -28,7 +28,7 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_parser = choice::<Protocol>(), conflicts_with = "plan")]
     protocol: Option<Protocol>,
     /// Begin the run at this hour of a working day (work begins at 0): -0.2 is cold, 3.5 warm. The log then
-    /// has the temperature columns of [temperature] in the stage file.
+    /// has the temperature columns that the stage file names.
     #[arg(long, value_name = "H", value_parser = hour, allow_negative_numbers = true)]
     hour: Option<f64>,
     /// Stage and noise. An even seed has magnets as designed, an odd seed imperfect magnets.

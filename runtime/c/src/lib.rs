@@ -8,7 +8,7 @@
 #![no_std]
 
 mod storage;
-mod types;
+pub mod types;
 
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;

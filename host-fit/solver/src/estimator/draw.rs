@@ -74,7 +74,7 @@ mod tests {
     fn log(sizes: &[usize]) -> Dataset {
         let stage = shipped::stage();
         let truth = crate::estimator::paper::Parameters::designed(&stage);
-        let row = crate::estimator::synthetic::Protocol::exact(truth, 1)
+        let row = crate::estimator::synthetic_for_tests::Protocol::exact(truth, 1)
             .dataset(&stage)
             .rows[0];
         let mut dataset = Dataset::default();

@@ -3,7 +3,7 @@
 use super::*;
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
 use crate::estimator::model::Model;
-use crate::estimator::synthetic::Protocol;
+use crate::estimator::synthetic_for_tests::Protocol;
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
 use nalgebra::DVector;

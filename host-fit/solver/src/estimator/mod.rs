@@ -54,8 +54,7 @@ mod sample_for_tests;
 pub mod sandwich;
 pub mod service;
 #[cfg(test)]
-#[path = "synthetic_for_tests.rs"]
-pub mod synthetic;
+pub mod synthetic_for_tests;
 pub mod temperature;
 pub mod terms;
 #[cfg(test)]

@@ -73,7 +73,7 @@ impl<'a> Problem<'a> {
 mod tests {
     use super::*;
     use crate::estimator::paper::Parameters;
-    use crate::estimator::synthetic::Protocol;
+    use crate::estimator::synthetic_for_tests::Protocol;
     use hallstage_input::dataset::Movement;
     use hallstage_input::shipped;
     use runtime::ModelKind;

@@ -1,5 +1,5 @@
 //! Logs made from Model (31) itself, by the paper's protocol: for tests, where the true parameters must
-//! be known. Other crates include this file.
+//! be known.
 
 use crate::estimator::paper::Parameters;
 use hallstage_input::dataset::{Dataset, LoggedFrame, Movement, Row};

@@ -17,7 +17,7 @@ pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
 pub(super) const RESIDUAL: usize = WIDTH - 1;
 
 /// Terms of usual magnets from a usual workshop, in parts of their prior in
-/// [`TERMS`](hallstage_solver::estimator::terms::TERMS).
+/// [`TERMS`].
 const USUAL_PART: f64 = 0.5;
 /// E in parts of its prior, over the part of the terms even in u: from 60 simulated stages.
 const E_PART: f64 = 0.4;

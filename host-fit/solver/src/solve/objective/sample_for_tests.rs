@@ -4,7 +4,7 @@ use crate::estimator::model::Model;
 use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
 use crate::estimator::rows::FieldRow;
-use crate::estimator::synthetic::Protocol;
+use crate::estimator::synthetic_for_tests::Protocol;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped;
 use hallstage_input::stage::{Range, Stage};
