@@ -75,8 +75,6 @@ pub struct ReadOptions {
     pub saturated: SaturatedCodes,
     /// Whether the reference is needed.
     pub reference: ReferenceUse,
-    /// Length of movements in logs without a column for them, s; `None`: they end only at gaps.
-    pub split_s: Option<f64>,
     /// Largest number of rows that are held; from longer logs a sample.
     pub rows_max: usize,
     /// Shows how far the reading is, and can end it.
@@ -95,7 +93,6 @@ impl ReadOptions {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Bad,
         reference: ReferenceUse::Required,
-        split_s: None,
         rows_max: FIT_ROWS_MAX,
         watch: Watch::NONE,
     };
@@ -105,7 +102,6 @@ impl ReadOptions {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Keep,
         reference: ReferenceUse::IfPresent,
-        split_s: None,
         rows_max: FIT_ROWS_MAX,
         watch: Watch::NONE,
     };

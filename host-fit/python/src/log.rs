@@ -40,15 +40,9 @@ pub struct Log {
     pub stage: Py<Stage>,
 }
 
-fn options(bad_rows: &str, split_s: Option<f64>) -> PyResult<ReadOptions> {
-    if let Some(seconds) = split_s
-        && !(1e-3..=1e6).contains(&seconds)
-    {
-        return Err(wrong("split_s", "0.001 to 1,000,000 s"));
-    }
+fn options(bad_rows: &str) -> PyResult<ReadOptions> {
     Ok(ReadOptions {
         bad_rows: chosen::<BadRows>("bad_rows", bad_rows)?,
-        split_s,
         // A log that is only decoded has none.
         reference: ReferenceUse::IfPresent,
         watch: work::WATCH,
@@ -60,19 +54,17 @@ fn options(bad_rows: &str, split_s: Option<f64>) -> PyResult<ReadOptions> {
 /// decimal commas, units in the header, UTF-16, dates as times.
 ///
 /// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to count rows with a
-/// bad cell and go on without them. `split_s`: length of the movements of a log that has no column for
-/// them, s; else they end at gaps in time alone.
+/// bad cell and go on without them.
 ///
 /// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
 /// be read.
 #[pyfunction]
-#[pyo3(signature = (paths, stage, *, bad_rows = "refuse", split_s = None))]
+#[pyo3(signature = (paths, stage, *, bad_rows = "refuse"))]
 pub fn read_log(
     py: Python<'_>,
     paths: &Bound<'_, PyAny>,
     stage: Py<Stage>,
     bad_rows: &str,
-    split_s: Option<f64>,
 ) -> PyResult<Log> {
     let paths: Vec<PathBuf> = match paths.extract::<PathBuf>() {
         Ok(one) => vec![one],
@@ -86,7 +78,7 @@ pub fn read_log(
             "`-` is no file; read standard input by sys.stdin",
         ));
     }
-    let options = options(bad_rows, split_s)?;
+    let options = options(bad_rows)?;
     let designed = Arc::clone(&stage.get().designed);
     let reading = work::run(py, || log::read(&paths, &designed, &options))?;
     let reading = reading.map_err(|error| log_error(py, &error))?;
@@ -108,7 +100,7 @@ impl Log {
     /// `x`, `y1`, `y2`, or the pose `x`, `y`, `rz`; a log that is only decoded needs none. `movement`: its number,
     /// whole, (n,); without it movements end at gaps in time. `mount`, `body`: temperatures, degC, (n,), NaN
     /// where there is none. `units` of lengths: m, mm, um, nm, pm; `angles`: rad, mrad, urad, nrad, deg.
-    /// `name` stands for the file in reports; `bad_rows`, `split_s` as for `read_log`.
+    /// `name` stands for the file in reports; `bad_rows` as for `read_log`.
     ///
     /// Raises `ValueError` with the name of an argument of wrong shape, dtype or unit, and `LogError` for a
     /// row, with `.line` the row from 0 and `.name` the argument.
@@ -116,7 +108,7 @@ impl Log {
     #[pyo3(signature = (
         stage, *, t_us, hall, caps = None, z = None, rx = None, ry = None, x = None, y1 = None, y2 = None, y = None,
         rz = None, movement = None, mount = None, body = None, units = "m", angles = "rad", name = "arrays",
-        bad_rows = "refuse", split_s = None
+        bad_rows = "refuse"
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -143,9 +135,8 @@ impl Log {
         angles: &str,
         name: &str,
         bad_rows: &str,
-        split_s: Option<f64>,
     ) -> PyResult<Self> {
-        let options = options(bad_rows, split_s)?;
+        let options = options(bad_rows)?;
         let mut text = ArrayText::new(units, angles)?;
         text.real("t_us", "t_us", Some(t_us))?;
         text.whole("movement", movement)?;
@@ -366,7 +357,6 @@ impl Log {
     ) -> Result<LogReading, LogError> {
         let options = &ReadOptions {
             bad_rows: self.options.bad_rows,
-            split_s: self.options.split_s,
             watch: self.options.watch,
             ..command
         };

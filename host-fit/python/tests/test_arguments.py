@@ -34,7 +34,7 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
     arrays = {
         "stage": stage, "t_us": run30.t_us[:ROWS], "hall": hall, "caps": caps, "x": x, "y": y, "rz": rz,
         "movement": run30.movement[:ROWS], "mount": np.full(ROWS, 20.0), "body": np.full(ROWS, 20.0),
-        "units": "m", "angles": "rad", "name": "a", "bad_rows": "refuse", "split_s": None,
+        "units": "m", "angles": "rad", "name": "a", "bad_rows": "refuse",
     }  # fmt: skip
     log = hs.Log.from_arrays(**arrays)
     decoder = cal.decoder()
@@ -55,7 +55,7 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
     return [
         (hs.Stage.load, {"path": DATA / "stage.toml"}),
         (hs.Stage, tables),
-        (hs.read_log, {"paths": DATA / "run30.csv.gz", "stage": stage, "bad_rows": "skip", "split_s": None}),
+        (hs.read_log, {"paths": DATA / "run30.csv.gz", "stage": stage, "bad_rows": "skip"}),
         (hs.Log.from_arrays, arrays),
         (hs.check, {"log": log}),
         (hs.fit, fit),

@@ -131,8 +131,6 @@ def test_temperatures_pass_through(run30: hs.Log) -> None:
         ("units", "um/s", "units"),
         ("angles", "um", "angles: `um`"),
         ("bad_rows", "drop", "bad_rows"),
-        ("split_s", -1.0, "split_s"),
-        ("split_s", float("nan"), "split_s"),
     ],
 )
 def test_a_wrong_argument_is_named(stage: hs.Stage, argument: str, value: object, words: str) -> None:

@@ -1,6 +1,5 @@
 //! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
-use super::arguments::between;
 use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -38,10 +37,6 @@ pub(super) struct Logs {
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) stage: StageFile,
-    /// Logs without a column for the movement: begin one after this many seconds, not only after gaps
-    /// in time.
-    #[arg(long, value_name = "SECONDS", value_parser = movement_seconds)]
-    split: Option<f64>,
 }
 
 impl Logs {
@@ -53,7 +48,6 @@ impl Logs {
     /// How they are read, by the arguments and the command.
     pub(super) fn options(&self, command: ReadOptions) -> ReadOptions {
         ReadOptions {
-            split_s: self.split,
             watch: interrupt::WATCH,
             ..command
         }
@@ -108,11 +102,6 @@ pub(super) struct Threads {
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) number: Option<u16>,
-}
-
-/// A length of movements: `--split`.
-fn movement_seconds(text: &str) -> Result<f64, String> {
-    between(text, 1e-3, 1e6, "a number of seconds")
 }
 
 /// A text that goes into a blob.

@@ -1,38 +1,8 @@
-//! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
+//! Logs as laboratories have them, from the command line: read from a pipe, drafted for.
 
-use crate::common::{Bench, changed, log, says, stderr, stdout};
+use crate::common::{Bench, log, says, stderr, stdout};
 
 const MARK: &str = "# FILL IN: ";
-
-/// The shipped log, thinned, as one recording: no column for the movement, and time that goes on.
-fn one_recording() -> String {
-    let whole = changed(&log(), |_, cells| cells[1] += cells[0] * 2_000_000);
-    let rows = whole.lines().filter_map(|line| line.split_once(','));
-    rows.map(|(_, rest)| format!("{rest}\n")).collect()
-}
-
-#[test]
-fn one_long_recording_is_fitted_as_its_movements_are() {
-    let bench = Bench::with_log();
-    bench.write("whole.csv", one_recording());
-    let fit = |log: &str| {
-        let fit = format!("fit {log} --out p.bin --json p.json");
-        let warnings = stderr(&bench.good(&fit));
-        (bench.json("p.json"), warnings)
-    };
-    let (want, _) = fit("log.csv");
-    let (have, warnings) = fit("whole.csv --split 2");
-    assert_eq!(
-        (&have["errors"], &have["movements"]),
-        (&want["errors"], &57.into())
-    );
-    says(&warnings, "The times separate 57");
-    bench.good("eval p.bin whole.csv --split 2");
-    let refused = "fit log.csv --out p.bin --split 2";
-    bench.bad(refused, 3, &["log.csv", "--split does not apply"]);
-    let usage = "fit log.csv --out p.bin --split 0";
-    bench.bad(usage, 2, &["--split"]);
-}
 
 #[test]
 fn a_log_comes_by_standard_input_too() {

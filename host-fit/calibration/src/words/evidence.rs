@@ -24,9 +24,8 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("movement {first} has one row{others}. It adds nothing to the fit, because its zero deviation fits it exactly")
         }
         Kind::FileCut { .. } => "the last line has no line break, so its last number may be cut".to_owned(),
-        Kind::MovementsByTime { movements, split_s, gap_rows, .. } => {
-            let every = split_s.map_or(String::new(), |seconds| format!("every {seconds} s, "));
-            format!("there is no column for the movement. The times separate {movements} movements: one begins {every}after a gap of more than {gap_rows} rows and where the time starts again")
+        Kind::MovementsByTime { movements, gap_rows, .. } => {
+            format!("there is no column for the movement. The times separate {movements} movements: one begins after a gap of more than {gap_rows} rows and where the time starts again")
         }
         Kind::BetweenCodes { mean_codes, .. } => format!("voltages are {mean_codes:.2} codes from whole codes on average"),
         Kind::Excerpt { rows, taken, runs } => format!("the fit and the diagnosis use {taken} of {rows} rows, in {runs} runs"),

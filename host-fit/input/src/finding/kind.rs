@@ -128,8 +128,8 @@ kinds! {
     SingleRows { file: String, first: i64, movements: usize } => Code::ShortMovements, *movements as f64, "movements";
     /// The last line has no line break.
     FileCut { file: String, line: usize } => Code::FileCut;
-    /// Movements are separated by the time, every `split_s` seconds and after a gap of more than `gap_rows`.
-    MovementsByTime { file: String, movements: usize, split_s: Option<f64>, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
+    /// Movements are separated by the time, after a gap of more than `gap_rows` rows and where the time starts again.
+    MovementsByTime { file: String, movements: usize, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
     /// Mean distance of voltages from whole codes.
     BetweenCodes { file: String, mean_codes: f64 } => Code::BetweenCodes, *mean_codes, "codes";
     /// A fit uses `taken` rows in `runs` of rows that follow each other.

@@ -183,9 +183,6 @@ pub enum LogProblem {
         /// The unit in the row below the header.
         below: String,
     },
-    /// `--split` for a log with a column for the movement.
-    #[error("the log has a column for the movement, so --split does not apply; leave it out")]
-    SplitWithMovements,
     /// Two sets of columns hold the same quantities.
     #[error(
         "both `{one}` and `{other}` are there and hold the same thing; drop one set with `ignore = [...]` in the [log] table of stage.toml"

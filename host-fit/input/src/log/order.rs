@@ -1,9 +1,8 @@
 //! The order of the rows of a log: movement after movement, time forwards; and their sequence numbers
 //! by time, so that a gap shows as frames missed.
 //!
-//! In a log that has no column for them, a movement ends where the time starts again, where rows are
-//! missing for more than ten of the log's own periods (its median step), or, where the user
-//! asks for it, after a given time.
+//! In a log that has no column for them, a movement ends where the time starts again, and where rows are
+//! missing for more than ten of the log's own periods (its median step).
 
 use super::error::{LogError, LogProblem, Place};
 use super::table::Head;
@@ -46,8 +45,6 @@ pub struct Order {
     cells: OrderCells,
     /// The median time between rows, us.
     pub period_us: f64,
-    /// Length of the movements, us, if the user asks for one.
-    split_us: Option<f64>,
     /// Movement, if there is a column for it, and time of the row in hand.
     current: Option<(Option<i64>, f64)>,
     /// The line after the end of each movement.
@@ -68,19 +65,17 @@ pub struct Order {
 struct Kept {
     movement: i64,
     rows: usize,
-    first_us: f64,
     last_us: f64,
     /// Of the last row.
     sequence: u32,
 }
 
 impl Order {
-    /// For a log with this period, us; `split_s` is the length of its movements, if the user asks for one.
-    pub fn new(cells: OrderCells, period_us: f64, split_s: Option<f64>) -> Self {
+    /// For a log with this period, us.
+    pub fn new(cells: OrderCells, period_us: f64) -> Self {
         Self {
             cells,
             period_us,
-            split_us: split_s.map(|seconds| seconds * 1e6),
             current: None,
             left: HashMap::new(),
             started: (0.0, 0),
@@ -144,15 +139,11 @@ impl Order {
     /// Keeps the row in hand.
     pub fn keep(&mut self) -> KeptRow {
         let (named, t_us) = self.current.unwrap_or_default();
-        // Half a period early is on time: steps jitter.
-        let is_over = |length: f64| t_us - self.kept.first_us >= length - self.period_us / 2.0;
-        let begins = self.begins || self.split_us.is_some_and(is_over);
-        self.begins = false;
+        let begins = std::mem::take(&mut self.begins);
         if begins {
             self.end_movement();
             self.kept = Kept {
                 movement: named.unwrap_or(self.movements as i64),
-                first_us: t_us,
                 ..Kept::default()
             };
             self.movements += 1;

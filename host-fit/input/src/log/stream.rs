@@ -1,6 +1,6 @@
 //! A log row by row, in little memory however long it is.
 
-use super::error::{LogError, LogProblem, Place};
+use super::error::LogError;
 use super::header;
 use super::order::{GAP_PERIODS, Order, OrderCells};
 use super::rows::{BadCell, RowReader};
@@ -76,9 +76,6 @@ impl<'a> LogRows<'a> {
         let mut table = Table::open(text, |name| stage.log.knows(name))?;
         table.lines = table.lines.watched(options.watch, what);
         let columns = header::columns(&table.head, stage, options.reference)?;
-        if columns.movement.is_some() && options.split_s.is_some() {
-            return Err(Place::new(table.head.path, None).refuse(LogProblem::SplitWithMovements));
-        }
         let servo_us = stage.servo_period_s * 1e6;
         let period_us = table.period_us(columns.time, columns.movement)?;
         let cells = OrderCells {
@@ -87,7 +84,7 @@ impl<'a> LogRows<'a> {
         };
         let keep_saturated = options.saturated == SaturatedCodes::Keep;
         Ok(Self {
-            order: Order::new(cells, period_us.unwrap_or(servo_us), options.split_s),
+            order: Order::new(cells, period_us.unwrap_or(servo_us)),
             reader: RowReader::new(columns, stage, keep_saturated),
             skipped: Skipped::default(),
             options: *options,
@@ -171,7 +168,6 @@ impl<'a> LogRows<'a> {
             warnings.push(Finding::new(Kind::MovementsByTime {
                 file: file.clone(),
                 movements: order.movements,
-                split_s: self.options.split_s,
                 gap_rows: GAP_PERIODS as i64,
             }));
         }

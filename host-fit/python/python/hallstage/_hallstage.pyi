@@ -53,7 +53,6 @@ def read_log(
     stage: Stage,
     *,
     bad_rows: Literal["refuse", "skip"] = "refuse",
-    split_s: float | None = None,
 ) -> Log: ...
 def plan(stage: Stage, *, seconds: float = 20.0) -> Plan: ...
 def simulate(
@@ -126,7 +125,6 @@ class Log:
         angles: Literal["rad", "mrad", "urad", "nrad", "deg"] = "rad",
         name: str = "arrays",
         bad_rows: Literal["refuse", "skip"] = "refuse",
-        split_s: float | None = None,
     ) -> Log: ...
     def __len__(self) -> int: ...
     @property

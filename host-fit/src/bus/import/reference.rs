@@ -85,7 +85,7 @@ impl Reference {
             time: cells.time.cell,
             movement: movement.map(|source| source.cell),
         };
-        let mut order = Order::new(places, period_us, None);
+        let mut order = Order::new(places, period_us);
         let mut counts = ReferenceCounts {
             has_movements: movement.is_some(),
             ..ReferenceCounts::default()

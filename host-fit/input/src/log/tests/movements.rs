@@ -10,9 +10,8 @@ fn log_at(times_ms: impl IntoIterator<Item = i64>) -> String {
     header.replace("movement,", "") + "\n" + &rows.collect::<String>()
 }
 
-fn read_split(text: &str, split_s: Option<f64>) -> Result<LogReading, LogError> {
+fn read_skipping(text: &str) -> Result<LogReading, LogError> {
     let options = ReadOptions {
-        split_s,
         bad_rows: BadRows::Skip,
         ..ReadOptions::default()
     };
@@ -21,8 +20,8 @@ fn read_split(text: &str, split_s: Option<f64>) -> Result<LogReading, LogError> 
 
 /// How many rows each movement has.
 #[track_caller]
-fn lengths(text: &str, split_s: Option<f64>) -> Vec<usize> {
-    let reading = read_split(text, split_s).expect("sound");
+fn lengths(text: &str) -> Vec<usize> {
+    let reading = read_skipping(text).expect("sound");
     let movements = reading.dataset.movements;
     let is_found = reading.warnings.iter().any(|found| {
         found.code() == Code::MovementsByTime && found.value() == Some(movements.len() as f64)
@@ -42,20 +41,20 @@ fn lengths(text: &str, split_s: Option<f64>) -> Vec<usize> {
 
 #[test]
 fn a_continuous_log_is_one_movement_however_its_times_jitter() {
-    assert_eq!(lengths(&log_at((0..500).map(|k| 2 * k)), None), [500]);
+    assert_eq!(lengths(&log_at((0..500).map(|k| 2 * k))), [500]);
     let jitter = (0..500).map(|k| 20 * k + [0, 3, -4, 8][k as usize % 4]);
-    assert_eq!(lengths(&log_at(jitter), None), [500]);
+    assert_eq!(lengths(&log_at(jitter)), [500]);
     // Every tenth row is missing, and ten in a row once.
     let missing = (0..500).filter(|k| k % 10 != 3 && !(100..109).contains(k));
-    assert_eq!(lengths(&log_at(missing.map(|k| 2 * k)), None).len(), 1);
+    assert_eq!(lengths(&log_at(missing.map(|k| 2 * k))).len(), 1);
 }
 
 #[test]
 fn a_movement_ends_at_a_gap_and_where_the_time_starts_again() {
     let gaps = (0..20).chain(31..50).chain(200..230).map(|k| 2 * k);
-    assert_eq!(lengths(&log_at(gaps), None), [20, 19, 30]);
+    assert_eq!(lengths(&log_at(gaps)), [20, 19, 30]);
     let again = (0..20).chain(0..30).chain(-5..20).map(|k| 2 * k);
-    assert_eq!(lengths(&log_at(again), None), [20, 30, 25]);
+    assert_eq!(lengths(&log_at(again)), [20, 30, 25]);
 }
 
 #[test]
@@ -67,26 +66,13 @@ fn rows_that_are_left_out_make_no_gap() {
     for line in &mut lines[20..45] {
         *line = line.replace(",13,", ",32767,");
     }
-    assert_eq!(lengths(&(lines.join("\n") + "\n"), None), [35]);
+    assert_eq!(lengths(&(lines.join("\n") + "\n")), [35]);
     // A gap before rows that are left out is one.
     for line in &mut lines[20..] {
         let (time, rest) = line.split_once(',').expect("cells");
         *line = format!("{},{rest}", time.parse::<i64>().expect("a time") + 100_000);
     }
-    assert_eq!(lengths(&(lines.join("\n") + "\n"), None), [19, 16]);
-}
-
-#[test]
-fn split_cuts_movements_of_a_length() {
-    let log = log_at((0..250).map(|k| 2 * k));
-    assert_eq!(lengths(&log, Some(0.2)), [100, 100, 50]);
-    let jitter = log_at((0..250).map(|k| 20 * k + [0, 3, -4, 8][k as usize % 4]));
-    assert_eq!(lengths(&jitter, Some(2.0)), [100, 100, 50]);
-    // A gap begins a movement, too.
-    let gap = log_at((0..130).chain(200..250).map(|k| 2 * k));
-    assert_eq!(lengths(&gap, Some(0.2)), [100, 30, 50]);
-    let has_a_column = problem(read_split(LOG, Some(2.0)));
-    assert!(matches!(has_a_column, LogProblem::SplitWithMovements));
+    assert_eq!(lengths(&(lines.join("\n") + "\n")), [19, 16]);
 }
 
 #[test]
@@ -96,7 +82,7 @@ fn rows_out_of_order_stay_refused() {
         (0..30).chain(20..40).collect(),
         (0..30).chain(29..40).collect(),
     ] {
-        let error = read_split(&log_at(times), None).expect_err("out of order");
+        let error = read_skipping(&log_at(times)).expect_err("out of order");
         let text = error.to_string();
         let is_order = text.contains("backwards") || text.contains("repeats");
         assert!(is_order, "{text}");
