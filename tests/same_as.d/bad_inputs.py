@@ -135,13 +135,11 @@ def bad_inputs(inputs):
         yield Case(f"blob, {name}: eval", ["eval", bad, *sound])
         yield Case(f"blob, {name}: decode", ["decode", bad, *sound, "--out", "pose.csv"])
         yield Case(f"blob, {name}: export", ["export", bad, "--slot", "0", "--out", "x.hex"])
-        yield Case(f"blob, {name}: warm start", ["fit", *sound, *FIT, "--start", bad])
         yield Case(f"blob, {name}: live", ["live", bad, "--can", "no-such-bus"])
 
     record = f"{IN}/bus-16.log"
     import_record = ["import", record, f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv"]
     any_bus = ["--can", "no-such-bus"]
-    start_30 = ["--start", f"{IN}/shipped-30.bin", "--solver", "shtlbo"]
     usage = {
         "nothing": [],
         "unknown command": ["calibrate"],
@@ -161,7 +159,6 @@ def bad_inputs(inputs):
         "no such log": ["fit", "nowhere.csv", *sound[1:], *FIT],
         "a folder as log": ["fit", ".", *sound[1:], *FIT],
         "the same log twice": ["fit", sound[0], *sound, *FIT],
-        "search starts from (30)": ["fit", *sound, *FIT, *start_30],
         "no output": ["decode", blob, *sound],
         "another stage": ["live", blob, *any_bus, "--serial", "other"],
         "no such bus, live": ["live", blob, *any_bus],

@@ -98,7 +98,6 @@ def fits(log):
         paper = ["--draw", "plain", "--train", "200", "--solver", "shtlbo", "--project", "none"]
         yield fit("as the paper", *paper)
         yield fit("population", "--population", "30", *few, "--solver", "shtlbo")
-        yield fit("warm start", "--start", log.blobs["31"], *few, "--solver", "shtlbo")
         for threads in ("1", "2"):
             yield fit(f"{threads} threads", "--threads", threads, "--seed", "7")
         yield fit("serial and time", "--serial", "HS-0007", "--created", "2026-11-20")

@@ -12,7 +12,6 @@ use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
 use host_fit::calibration::words;
 use host_fit::solver::estimator::draw::Draw;
-use host_fit::solver::estimator::paper::Parameters;
 use host_fit::solver::estimator::robust::Loss;
 use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -68,8 +67,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 ///
 /// `model`: "auto" (the field model where the log can carry it, else 31), "12", "15", "30", "31" (equations of
 /// the paper), "field". `solver`, `project`, `loss`, `train`, `draw`, `population`, `generations`, `seed`,
-/// `start` (a calibration), `serial`, `created`, `limit` ("x=1.5um,rz=4urad"),
-/// `force`: as the options of that program, which its reference explains. Other threads of Python go on
+/// `serial`, `created`, `limit` ("x=1.5um,rz=4urad"), `force`: as the options of that program, which its reference explains. Other threads of Python go on
 /// meanwhile; Ctrl-C ends it.
 ///
 /// Raises `LogRefused` with `.findings` where the log is no good for a calibration or the errors are beyond
@@ -77,8 +75,8 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 #[pyfunction]
 #[pyo3(signature = (
     log, *, model = "auto", solver = "shtlbo-lm", project = "linear", loss = None, train = None,
-    draw = "stratified", population = None, generations = None, seed = 1, start = None,
-    serial = "", created = "", limit = None, force = false
+    draw = "stratified", population = None, generations = None, seed = 1, serial = "", created = "",
+    limit = None, force = false
 ))]
 #[expect(
     clippy::too_many_arguments,
@@ -96,7 +94,6 @@ pub fn fit(
     population: Option<i64>,
     generations: Option<i64>,
     seed: u64,
-    start: Option<PyRef<'_, Calibration>>,
     serial: &str,
     created: &str,
     limit: Option<&str>,
@@ -125,7 +122,6 @@ pub fn fit(
             options: SolverOptions {
                 population: population.unwrap_or(usual.population),
                 generations: generations.unwrap_or(usual.generations),
-                known: start.map(|start| Parameters::from_set(start.set())),
                 watch: WATCH,
                 ..usual
             },

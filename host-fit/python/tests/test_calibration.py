@@ -45,7 +45,7 @@ def test_each_option_is_that_of_the_program(stage: hs.Stage, host_fit: HostFit) 
     )  # fmt: skip
     assert own.blob == (folder / "p.bin").read_bytes()
     assert own.model == "31" and own.blob != hs.fit(paper, model="31").blob
-    searched = hs.fit(paper, model="31", solver="shtlbo", population=8, generations=40, start=own)
+    searched = hs.fit(paper, model="31", solver="shtlbo", population=8, generations=40, force=True)
     assert searched.figures is not None and searched.figures["solver"] == "shtlbo"
 
 

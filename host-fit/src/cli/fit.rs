@@ -17,7 +17,6 @@ use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
 use hallstage_input::log::{BadRows, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::draw::Draw;
-use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::robust::Loss;
 use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::parameters::Text;
@@ -61,9 +60,6 @@ pub(super) struct FitArgs {
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Warm start: a search begins with the parameters of this blob among its population.
-    #[arg(long, value_name = "params.bin")]
-    start: Option<PathBuf>,
     #[command(flatten)]
     pub(super) threads: Threads,
     /// Serial number of the stage, for the blob; at most 32 bytes.
@@ -91,8 +87,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let posterior = posterior_file::beside(&args.out);
     let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
-    let inputs = args.logs.inputs().chain(args.start.as_deref());
-    super::check_outputs(outputs, Some(&args.report), inputs)?;
+    super::check_outputs(outputs, Some(&args.report), args.logs.inputs())?;
     let loss = choose_loss(args.loss, args.model, args.solver, args.project);
     let loss = loss.map_err(HostError::from_mismatch)?;
     interrupt::watch();
@@ -105,7 +100,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         },
     )?;
     let order = FitOrder {
-        settings: settings(args, loss)?,
+        settings: settings(args, loss),
         limits: args.limit.unwrap_or_default(),
     };
     let fitted = terminal::timed("fit", || order.fit(&log, &stage));
@@ -156,17 +151,15 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
 }
 
 /// How the fit is made, by the arguments.
-fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
-    let start = args.start.as_deref().map(blob_file::read).transpose()?;
+fn settings(args: &FitArgs, loss: Loss) -> FitSettings {
     let usual = SolverOptions::new(args.project, args.seed);
     let options = SolverOptions {
         population: args.population.map_or(usual.population, |n| n as usize),
         generations: args.generations.map_or(usual.generations, |n| n as usize),
-        known: start.as_ref().map(Parameters::from_set),
         watch: interrupt::watch(),
         ..usual
     };
-    Ok(FitSettings {
+    FitSettings {
         model: args.model,
         train: args.train,
         draw: args.draw,
@@ -176,7 +169,7 @@ fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
         serial: args.serial.clone().unwrap_or_default(),
         created: args.report.created.clone().unwrap_or_default(),
         force: args.force,
-    })
+    }
 }
 
 /// What the report says of a fit with its figures, or of a log that has none.
@@ -189,11 +182,6 @@ fn source<'a>(
     let serial = args.serial.as_deref().unwrap_or_default();
     let what = ("Calibration certificate", serial);
     let mut source = args.report.source(what, &args.logs, (log, stage), subject);
-    if let Some(start) = &args.start {
-        source
-            .provenance
-            .add_file(start, "parameters to start from");
-    }
     if let (Some((fit, _)), End::Written | End::Interrupted) = (fit, subject.end) {
         let blob = blob_file::to_bytes(&args.out, &fit.set)?;
         let provenance = &mut source.provenance;

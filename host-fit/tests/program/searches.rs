@@ -28,18 +28,6 @@ fn the_papers_experiment_runs_and_ends_far_above_the_floor() {
     assert!(rms("errors_solver_delta") > rms("errors"));
 }
 
-#[test]
-fn a_warm_start_continues_from_a_blob() {
-    let bench = bench();
-    let fit = "fit log.csv.gz --train 200 --project none";
-    bench.good(&format!("{fit} --solver lm --out lm.bin"));
-    bench.good(&format!(
-        "{fit} --solver shtlbo --generations 2 --start lm.bin --out p.bin --json p.json"
-    ));
-    let fitness = number(&bench.json("p.json")["train_fitness"]);
-    assert!(fitness < 1.3, "{fitness}");
-}
-
 /// Runs a search that would take hours, and presses Ctrl-C when it has had two seconds of processor time, however
 /// long a busy machine takes to give it these.
 #[cfg(unix)]

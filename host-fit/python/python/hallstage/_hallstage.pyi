@@ -75,7 +75,6 @@ def fit(
     population: int | None = None,
     generations: int | None = None,
     seed: int = 1,
-    start: Calibration | None = None,
     serial: str = "",
     created: str = "",
     limit: str | None = None,

@@ -9,7 +9,6 @@ use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
 use super::{Projection, Solution, SolveError, SolverOptions};
 use crate::estimator::least_squares;
-use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
 
 /// Rows for a search that a least-squares fit finishes.
@@ -75,15 +74,12 @@ pub fn solve_finished(
         other => other,
     };
     let Some(objective) = Objective::new(&few, projection) else {
-        return least_squares::solve(problem, options.known.as_slice());
+        return least_squares::solve(problem, &[]);
     };
     let found = search(SearchKind::Shtlbo, &objective, options, Some(NEAR));
-    let mut starts: Vec<Parameters> = Vec::new();
-    if found.cost.is_finite() {
-        starts.extend(objective.parameters(&found.best));
-    }
-    starts.extend(options.known);
-    let mut solution = least_squares::solve(problem, &starts)?;
+    let is_usable = found.cost.is_finite();
+    let start = is_usable.then(|| objective.parameters(&found.best));
+    let mut solution = least_squares::solve(problem, start.flatten().as_slice())?;
     solution.evaluations += found.evaluations as u64;
     solution.history = found.history;
     solution.stopped = format!("search: {}; finish: {}", found.reason, solution.stopped);
@@ -96,9 +92,7 @@ fn search(
     options: &SolverOptions,
     stall: Option<Stall>,
 ) -> SearchResult {
-    let known = options.known.iter();
-    let mut first: Vec<Vec<f64>> = known.map(|p| objective.individual(p)).collect();
-    first.extend(objective.first_population(options.population, options.seed));
+    let first = objective.first_population(options.population, options.seed);
     let options = SearchOptions {
         first: &first,
         stall,

@@ -107,7 +107,7 @@ impl Solver {
         let started = Instant::now();
         let mut solution = match self {
             Self::Finished => by_search::solve_finished(problem, options)?,
-            Self::LeastSquares => least_squares::solve(problem, options.known.as_slice())?,
+            Self::LeastSquares => least_squares::solve(problem, &[])?,
             Self::Search(kind) => by_search::solve(kind, problem, options)?,
         };
         solution.elapsed = started.elapsed();
@@ -126,14 +126,12 @@ pub struct SolverOptions {
     pub population: usize,
     /// Generations of a population.
     pub generations: usize,
-    /// Known parameters to start from, for example of an earlier blob.
-    pub known: Option<Parameters>,
     /// Shows how far a search is, and can end it: it keeps the best so far.
     pub watch: Watch<'static>,
 }
 
 impl SolverOptions {
-    /// The usual size of a population for a form, nothing known, watched by nobody.
+    /// The usual size of a population for a form, watched by nobody.
     pub const fn new(projection: Projection, seed: u64) -> Self {
         let (population, generations) = by_search::default_size(projection);
         Self {
@@ -141,7 +139,6 @@ impl SolverOptions {
             seed,
             population,
             generations,
-            known: None,
             watch: Watch::NONE,
         }
     }

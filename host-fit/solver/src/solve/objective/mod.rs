@@ -127,37 +127,6 @@ impl<'a> Objective<'a> {
         Some(parameters)
     }
 
-    /// An individual with these parameters, for a warm start; outside the bounds where the
-    /// parameters are. Of `None`, the coordinates are the nearest to the designed ones that have the
-    /// lever arms, and the zero deviations the best for the parameters.
-    pub fn individual(&self, parameters: &Parameters) -> Vec<f64> {
-        let model = self.problem.model;
-        let fitted = &parameters.values[THETA..model.free_count()];
-        match self.projection {
-            Projection::None => {
-                let places_m = parameters.nearest_places_m(self.problem.stage);
-                let mut individual = paper_signs(places_m).concat();
-                individual.extend(fitted);
-                if model.has_zero_deviation {
-                    individual.extend(best_delta_m(self.problem, parameters).as_flattened());
-                }
-                individual
-            }
-            Projection::Delta => {
-                let ranges = self.arm_ranges(parameters).into_iter();
-                let places = ranges
-                    .zip(parameters.values)
-                    .map(|(range, arm_m)| (arm_m - range.low) / range.width());
-                places.chain(fitted.iter().copied()).collect()
-            }
-            Projection::Linear => {
-                let probes = parameters.slopes().into_iter().zip(parameters.eta());
-                let ratios = probes.map(|(slopes, eta)| slopes.map(|slope| slope / eta));
-                ratios.flatten().collect()
-            }
-        }
-    }
-
     /// The zero deviations that an individual holds, m for each movement of the log, zero for
     /// movements without rows; `None` in the forms that solve for them.
     pub fn own_delta_m(&self, individual: &[f64]) -> Option<Vec<[f64; 3]>> {

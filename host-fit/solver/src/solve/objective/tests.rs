@@ -6,7 +6,7 @@ use super::sample_for_tests::{
     dataset, fitness_by_the_runtime, phi, pose_by_the_runtime, problem, stage, truth,
 };
 use crate::estimator::model::Model;
-use crate::estimator::paper::Parameters;
+use crate::estimator::paper::{Parameters, THETA};
 use crate::estimator::problem::Problem;
 use crate::estimator::rows::FieldRow;
 use crate::estimator::zero_deviation::ZeroDeviation;
@@ -29,6 +29,22 @@ fn draw(cost: &Objective<'_>, number: usize) -> Vec<f64> {
     let mut individual = vec![0.0; cost.bounds().len()];
     stream(3, 0, Phase::Start, number).fill_within(cost.bounds(), &mut individual);
     individual
+}
+
+/// The individual of `Delta` or `Linear` that holds these parameters.
+fn individual(cost: &Objective<'_>, parameters: &Parameters) -> Vec<f64> {
+    let fitted = &parameters.values[THETA..cost.problem.model.free_count()];
+    if cost.projection == Projection::Linear {
+        let probes = parameters.slopes().into_iter().zip(parameters.eta());
+        return probes
+            .flat_map(|(slopes, eta)| slopes.map(|slope| slope / eta))
+            .collect();
+    }
+    let ranges = cost.arm_ranges(parameters).into_iter();
+    let places = ranges
+        .zip(parameters.values)
+        .map(|(range, arm_m)| (arm_m - range.low) / range.width());
+    places.chain(fitted.iter().copied()).collect()
 }
 
 fn objective<'a>(problem: &'a Problem<'a>, projection: Projection) -> Objective<'a> {
@@ -109,7 +125,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
     for model in MODELS {
         let problem = problem(&dataset, &stage, model);
         let cost = objective(&problem, Projection::Delta);
-        let near = cost.individual(&truth());
+        let near = individual(&cost, &truth());
         for number in 0..50 {
             // From the truth to anywhere in the box.
             let share = number as f64 / 49.0;
@@ -152,7 +168,7 @@ fn the_linear_form_equals_the_runtimes_model_at_its_own_gain_and_offsets() {
         stage: &wide,
         ..problem.clone()
     };
-    let near = cost.individual(&truth());
+    let near = individual(&cost, &truth());
     for number in 0..50 {
         let individual: Vec<f64> = near
             .iter()
@@ -217,40 +233,11 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
 }
 
 #[test]
-fn a_warm_start_gives_back_its_parameters() {
-    let (stage, dataset) = (stage(), dataset(6, 4));
-    for model in MODELS {
-        let problem = problem(&dataset, &stage, model);
-        let mut known = Parameters::designed(&stage);
-        let fitted = 3 * Model::from_kind(model).fitted;
-        known.values[..fitted].copy_from_slice(&truth().values[..fitted]);
-        let same = |back: Parameters| {
-            for (have, want) in back.values.iter().zip(known.values) {
-                assert_close(*have, want, 1e-12, "warm start");
-            }
-        };
-        let delta = objective(&problem, Projection::Delta);
-        same(
-            delta
-                .parameters(&delta.individual(&known))
-                .expect("parameters"),
-        );
-        let full = objective(&problem, Projection::None);
-        let individual = full.individual(&known);
-        same(full.parameters(&individual).expect("parameters"));
-        assert_eq!(individual.len(), full.bounds().len());
-        let best = super::best_delta_m(&problem, &known);
-        assert_eq!(full.own_delta_m(&individual).expect("its own"), best);
-        assert_eq!(delta.own_delta_m(&delta.individual(&known)), None);
-    }
-}
-
-#[test]
 fn whatever_lies_beyond_a_pole_costs_nan() {
     let (stage, dataset) = (stage(), dataset(6, 4));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     let cost = objective(&problem, Projection::Linear);
-    let sound = cost.individual(&truth());
+    let sound = individual(&cost, &truth());
     assert!(cost.cost(&sound) < 3.0);
     // a / eta of A with phi / eta of 0.06, 0.04, -0.5 in the first row.
     let [z, rx, ry] = problem.rows.rows[0].vertical;
