@@ -136,10 +136,10 @@ pub fn fit(
     };
     let stage = &log.designed;
     let made = work::run(py, || {
-        let log_error = (&*log.reading, &**stage);
+        let log_and_stage = (&*log.reading, &**stage);
         let fitted = order.fit(&log.reading, stage)?;
         let outcome = order.judge(fitted, &log.reading, stage)?;
-        let report = outcome.report(&order, log_error, started.elapsed().as_secs_f64());
+        let report = outcome.report(&order, log_and_stage, started.elapsed().as_secs_f64());
         Ok((outcome, report))
     })?;
     let (outcome, report) = made.map_err(|error| calibrate_error(&error))?;

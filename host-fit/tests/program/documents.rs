@@ -16,7 +16,7 @@ struct Document {
 }
 
 /// What documents may name.
-struct StoredPosterior {
+struct Existing {
     top: PathBuf,
     /// Help of the program by command; of the program itself without one.
     help: BTreeMap<String, String>,
@@ -52,7 +52,7 @@ fn documents() -> Vec<Document> {
     found
 }
 
-impl StoredPosterior {
+impl Existing {
     fn new() -> Self {
         let bench = Bench::new();
         let all = stdout(&bench.good("--help"));
@@ -247,7 +247,7 @@ fn commands(document: &Document) -> Vec<(String, PathBuf)> {
 
 #[test]
 fn what_documents_name_exists() {
-    let known = StoredPosterior::new();
+    let known = Existing::new();
     let mut faults = Vec::new();
     let mut count = 0;
     for document in documents() {

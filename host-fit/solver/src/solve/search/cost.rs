@@ -53,12 +53,12 @@ pub(crate) mod known {
     use super::{CostFunction, Range};
 
     /// A function over a cube.
-    pub struct StoredPosterior {
+    pub struct KnownFunction {
         bounds: Vec<Range>,
         function: fn(&[f64]) -> f64,
     }
 
-    impl StoredPosterior {
+    impl KnownFunction {
         pub fn new(dimensions: usize, low: f64, high: f64, function: fn(&[f64]) -> f64) -> Self {
             Self {
                 bounds: vec![Range { low, high }; dimensions],
@@ -67,7 +67,7 @@ pub(crate) mod known {
         }
     }
 
-    impl CostFunction for StoredPosterior {
+    impl CostFunction for KnownFunction {
         fn bounds(&self) -> &[Range] {
             &self.bounds
         }

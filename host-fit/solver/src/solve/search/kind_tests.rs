@@ -1,5 +1,5 @@
 use super::*;
-use crate::solve::search::cost::known::{StoredPosterior, rastrigin, rosenbrock, sphere};
+use crate::solve::search::cost::known::{KnownFunction, rastrigin, rosenbrock, sphere};
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use crate::solve::search::run::StopReason;
 use hallstage_input::stage::Range;
@@ -13,7 +13,7 @@ fn options(seed: u64, population: usize, evaluations: usize) -> SearchOptions<'s
     }
 }
 
-fn best_of_random_draws(function: &StoredPosterior, count: usize) -> f64 {
+fn best_of_random_draws(function: &KnownFunction, count: usize) -> f64 {
     let mut place = vec![0.0; function.bounds().len()];
     let costs = (0..count).map(|k| {
         stream(1, 0, Phase::Start, k).fill_within(function.bounds(), &mut place);
@@ -31,7 +31,7 @@ fn every_search_beats_random_draws_on_known_functions() {
         (rastrigin, 5.0, 0.6),
     ];
     for (function, half_width, share) in cases {
-        let function = StoredPosterior::new(8, -half_width, half_width, function);
+        let function = KnownFunction::new(8, -half_width, half_width, function);
         let median = |kind: SearchKind| {
             let run = |seed| kind.minimize(&function, &options(seed, 40, 8_000));
             let mut costs: Vec<f64> = (1..=5).map(|seed| run(seed).cost).collect();
@@ -52,7 +52,7 @@ fn every_search_beats_random_draws_on_known_functions() {
 
 #[test]
 fn the_path_is_the_same_on_any_number_of_threads() {
-    let function = StoredPosterior::new(7, -3.0, 3.0, rastrigin);
+    let function = KnownFunction::new(7, -3.0, 3.0, rastrigin);
     for kind in SearchKind::ALL {
         let path = |threads, seed| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -109,13 +109,13 @@ fn no_candidate_leaves_the_bounds_and_all_are_counted() {
 #[test]
 fn nan_costs_are_counted_and_never_win() {
     let hole = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { sphere(x) };
-    let function = StoredPosterior::new(2, -3.0, 3.0, hole);
+    let function = KnownFunction::new(2, -3.0, 3.0, hole);
     for kind in SearchKind::ALL {
         let found = kind.minimize(&function, &options(4, 30, 3_000));
         assert!(found.nan_costs > 0, "{}", kind.name());
         let is_found = found.best[0] >= 0.0 && found.cost < 0.1;
         assert!(is_found, "{}", kind.name());
-        let all = StoredPosterior::new(2, -3.0, 3.0, |_| f64::NAN);
+        let all = KnownFunction::new(2, -3.0, 3.0, |_| f64::NAN);
         let lost = kind.minimize(&all, &options(4, 30, 300));
         let is_counted = lost.cost.is_nan() && lost.nan_costs == lost.evaluations;
         assert!(is_counted, "{}", kind.name());
@@ -124,7 +124,7 @@ fn nan_costs_are_counted_and_never_win() {
 
 #[test]
 fn a_warm_start_is_never_worse_than_what_it_starts_from() {
-    let function = StoredPosterior::new(5, -3.0, 3.0, rosenbrock);
+    let function = KnownFunction::new(5, -3.0, 3.0, rosenbrock);
     let known = vec![vec![1.0, 1.0, 1.0, 1.0, 1.001], vec![0.0; 4]];
     for kind in SearchKind::ALL {
         let start = SearchOptions {
@@ -138,7 +138,7 @@ fn a_warm_start_is_never_worse_than_what_it_starts_from() {
 
 #[test]
 fn an_interrupt_ends_every_search_with_what_it_has() {
-    let function = StoredPosterior::new(3, -3.0, 3.0, sphere);
+    let function = KnownFunction::new(3, -3.0, 3.0, sphere);
     let flag = AtomicBool::new(true);
     for kind in SearchKind::ALL {
         let options = SearchOptions {
@@ -160,7 +160,7 @@ fn an_interrupt_ends_every_search_with_what_it_has() {
 
 #[test]
 fn the_papers_budget_is_20_100_evaluations() {
-    let function = StoredPosterior::new(3, -3.0, 3.0, sphere);
+    let function = KnownFunction::new(3, -3.0, 3.0, sphere);
     let found = SearchKind::Shtlbo.minimize(&function, &SearchOptions::new(1, 100, 100));
     assert_eq!(found.evaluations, 20_100);
     assert_eq!(found.reason, StopReason::Generations);

@@ -1,7 +1,7 @@
 //! Whole generations against steps worked by hand, with scripted random numbers.
 
 use super::*;
-use crate::solve::search::cost::known::StoredPosterior;
+use crate::solve::search::cost::known::KnownFunction;
 use crate::solve::search::mixing::Adaptation;
 use crate::solve::search::random::script::{Script, scripted};
 
@@ -22,7 +22,7 @@ fn keyed(
 
 /// Where the students are, and p, after one generation for each pair of phases.
 fn bred(mixing: Mixing, generations: Vec<[[Script; 3]; 2]>) -> (Vec<f64>, Option<f64>) {
-    let function = StoredPosterior::new(1, 0.0, 100.0, |x| x[0]);
+    let function = KnownFunction::new(1, 0.0, 100.0, |x| x[0]);
     let count = generations.len();
     let scripts = (1..).zip(generations);
     let scripts = scripts.flat_map(|(number, phases)| keyed(number, phases));
