@@ -3,6 +3,7 @@
 use crate::common::{Bench, changed, log, rows, thinned_log, with_cell};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use host_fit::input::shipped::STAGE_TOML;
 use std::io::Write;
 
 const FIT: &str = "fit log.csv --out p.bin --json p.json --report report";
@@ -64,6 +65,22 @@ fn damaged_blobs_are_refused_by_every_command_that_reads_one() {
         }
     }
     assert!(bench.holds_only(&["log.csv", "good.bin", "p.bin"]));
+}
+
+#[test]
+fn a_blob_of_other_scales_is_refused() {
+    let bench = Bench::with_log();
+    bench.good("fit log.csv --out p.bin");
+    for (key, from, to) in [
+        ("hall.m_per_count", "6.25e-8", "6.26e-8"),
+        ("capacitive.m_per_count", "1.5625e-8", "1.5626e-8"),
+    ] {
+        assert!(STAGE_TOML.contains(from));
+        bench.write("stage.toml", STAGE_TOML.replace(from, to));
+        bench.bad("eval p.bin log.csv", 3, &[key]);
+        bench.bad("decode p.bin log.csv --out pose.csv", 3, &[key]);
+    }
+    assert!(bench.holds_only(&["log.csv", "p.bin"]));
 }
 
 #[test]
@@ -129,6 +146,10 @@ fn wrong_usage_ends_with_status_2() {
         "fit",
         "fit log.csv --out p.bin --model 13",
         "fit log.csv --out p.bin --solver magic",
+        "fit log.csv --out p.bin --solver shtlbo --model 30",
+        "fit log.csv --out p.bin --solver shtlbo --model 31 --loss cauchy",
+        "fit log.csv --out p.bin --model field --solver lm",
+        "fit log.csv --out p.bin --model field --project none",
         "fit log.csv --out p.bin --train 0",
         "fit log.csv --out p.bin --seed -1",
         "fit log.csv --out p.bin --threads 0",

@@ -92,29 +92,6 @@ fn a_fit_beyond_its_limits_is_not_written_without_force() {
     assert_eq!(bench.json("i.json")["fit"]["forced"], false);
 }
 
-/// Where the search ranges hold every sign, the probes' places tell.
-#[test]
-fn exchanged_capacitive_sensors_are_named_without_search_ranges_that_exclude_them() {
-    let both = "[-5000.0, 5000.0]";
-    let stage = stage();
-    let lines = stage.lines().map(|line| match line.split(' ').next() {
-        Some(key @ ("b_per_rad" | "c_per_rad")) => format!("{key} = [{both}, {both}, {both}]\n"),
-        _ => format!("{line}\n"),
-    });
-    let stage: String = lines.collect();
-    let bench = Bench::new();
-    bench.write("stage.toml", stage);
-    let gaps = exchanged(&log(), "cap1_cnt", "cap2_cnt");
-    bench.write("log.csv", gaps);
-    let words = "fits if capacitive sensor 1 and capacitive sensor 2 are exchanged";
-    bench.bad("check log.csv --json c.json", 4, &[words]);
-    let found = &bench.json("c.json")["findings"][0];
-    assert_eq!(found["code"], "capacitive_swapped");
-    assert_eq!(found["severity"], "refuse");
-    let message = found["message"].as_str();
-    assert!(message.is_some_and(|text| text.contains(words)), "{found}");
-}
-
 #[test]
 fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
     let bench = Bench::new();
@@ -155,21 +132,9 @@ fn a_log_of_another_gain_is_distinguished_from_the_first() {
         let x_um = number(&log["errors"]["x"]["rmse_um"]);
         assert!((1.0..10.0).contains(&x_um), "{x_um}");
     }
-}
-
-#[test]
-fn a_sound_log_gives_no_finding_but_a_note() {
-    let bench = Bench::new();
-    bench.write("stage.toml", stage());
-    bench.write("log.csv", log());
-    bench.good("check log.csv --json c.json");
-    bench.good("fit log.csv --out p.bin --json p.json");
-    for name in ["c.json", "p.json"] {
-        let json = bench.json(name);
-        let findings = json["findings"].as_array().expect("a list");
-        let severities = findings.iter().map(|finding| finding["severity"].as_str());
-        assert!(severities.eq([Some("note")]), "{name}: {findings:?}");
-    }
+    let movement = |k: usize| json["zero_deviations"][k]["movement"].as_str();
+    assert_eq!(movement(0), Some("first.csv:0"));
+    assert_eq!(movement(57), Some("second.csv:0"));
 }
 
 #[test]

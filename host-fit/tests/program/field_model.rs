@@ -107,7 +107,7 @@ fn late(log: &str, rows: usize) -> String {
 fn a_late_reference_is_reported_by_every_model_and_taken_off() {
     let bench = bench();
     bench.write("late.csv", late(&bench.text("log.csv"), 3));
-    for model in ["31", "field", "auto"] {
+    for model in ["31", "field"] {
         let fit = format!("fit late.csv --out p.bin --model {model} --json p.json");
         let output = bench.good(&fit);
         says(stderr(&output), "behind the probes");
@@ -118,15 +118,6 @@ fn a_late_reference_is_reported_by_every_model_and_taken_off() {
             (value_us - 6000.0).abs() < 4.0 * error_us && lag["compensated"] == true,
             "{lag}"
         );
-        let found = json["findings"].as_array().expect("a list");
-        let found = found.iter().find(|f| f["code"] == "reference_lag");
-        let found = found.expect("the lag among the findings");
-        assert_eq!(
-            (&found["severity"], &found["unit"]),
-            (&"warn".into(), &"us".into())
-        );
-        let found_us = number(&found["value"]);
-        assert!((found_us - value_us).abs() < 1e-6, "{found_us} {value_us}");
     }
     let rms = &bench.json("p.json")["errors"]["y"]["rmse_um"];
     assert!(rms.as_f64() < Some(0.6), "{rms}");
@@ -182,30 +173,4 @@ fn a_log_of_little_motion_is_a_warning() {
     assert!(stderr(&fit).contains("moves Rz by 5"), "{}", stderr(&fit));
     let fit = bench.good("fit log.csv --out p.bin --model field");
     assert_eq!(stderr(&fit), "");
-}
-
-#[test]
-fn a_log_of_still_heights_is_refused_and_no_blob_is_left() {
-    let bench = Bench::with_log();
-    bench.bad(
-        "fit log.csv --out p.bin --model field",
-        4,
-        &[
-            "times the noise floor",
-            "record all six axes moving at once",
-        ],
-    );
-    assert!(bench.holds_only(&["log.csv"]));
-}
-
-#[test]
-fn the_field_model_has_a_solver_of_its_own() {
-    let bench = Bench::new();
-    for choice in ["--solver lm", "--solver shtlbo", "--project none"] {
-        bench.bad(
-            &format!("fit log.csv --out p.bin --model field {choice}"),
-            2,
-            &["--model field"],
-        );
-    }
 }

@@ -12,7 +12,6 @@ mod interrupted;
 mod killed;
 mod log_forms;
 mod main_job;
-mod odd_fits;
 mod outputs;
 mod plan;
 mod recalibrate;

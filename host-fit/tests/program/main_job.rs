@@ -37,6 +37,11 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     check_errors(&fit["errors"]);
     check_errors(&fit["errors_solver_delta"]);
     assert_eq!(fit["warnings"].as_array().map(Vec::len), Some(0));
+    let findings = fit["findings"].as_array().expect("a list");
+    assert!(
+        findings.iter().all(|finding| finding["severity"] == "note"),
+        "{findings:?}"
+    );
     let parameters = fit["parameters"].as_object().expect("an object");
     assert_eq!(parameters.len(), 18);
     for (name, p) in parameters {

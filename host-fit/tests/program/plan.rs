@@ -1,6 +1,6 @@
 //! `plan` from the command line: what it writes, and what it refuses.
 
-use crate::common::{Bench, number, says, stderr, stdout};
+use crate::common::{Bench, number, says, stdout};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// A run that is short enough to be planned fast, rehearsed, and written nowhere else.
@@ -34,34 +34,14 @@ fn what_cannot_be_planned_leaves_no_file() {
         4,
         &["no run was written", "make it longer"],
     );
-    for seconds in ["0", "-3", "nan", "inf", "601", "ten"] {
-        bench.bad(
-            &format!("{plan} --seconds {seconds}"),
-            2,
-            &["expected a number of seconds"],
-        );
-    }
-    bench.bad(
-        "plan --seconds 20 --out - --json -",
-        2,
-        &["standard output: also another output"],
-    );
+    let parts = ["expected a number of seconds"];
+    bench.bad(&format!("{plan} --seconds nan"), 2, &parts);
     bench.bad("plan --seconds 20 --out stage.toml", 2, &["also an input"]);
-    bench.write(
-        "fast.toml",
-        STAGE_TOML.replace("period_s = 0.002", "period_s = 1e-6"),
-    );
-    bench.bad(
-        "plan --stage fast.toml --seconds 20 --out run.csv",
-        2,
-        &["make it shorter"],
-    );
     bench.write(
         "far.toml",
         STAGE_TOML.replace("\nz = { service_m = 240e-6", "\nz = { amplitude_m = 1.0"),
     );
-    let output = bench.run("plan --stage far.toml --seconds 20 --out run.csv");
-    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
-    assert!(stderr(&output).contains("`motion.z.amplitude_m`: 1 m is outside"));
-    assert!(bench.holds_only(&["fast.toml", "far.toml"]));
+    let parts = ["`motion.z.amplitude_m`: 1 m is outside"];
+    bench.bad(&format!("{plan} --stage far.toml --seconds 20"), 3, &parts);
+    assert!(bench.holds_only(&["far.toml"]));
 }

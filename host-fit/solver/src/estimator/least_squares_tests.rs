@@ -113,6 +113,12 @@ fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends
     clipped.values[6] = 0.85;
     let clipped = normal(&problem, &clipped).expect("regular").chi_squared();
     assert!(free.cost < within.cost && within.cost < clipped);
+    // A range without width holds its parameter.
+    eta[0].low = 0.85;
+    eta[0].high = 0.85;
+    narrow.search.set("eta", eta);
+    let held = solve(&model_31(&dataset, &narrow), &[]).expect("a fit");
+    assert_eq!(held.parameters.eta()[0], 0.85);
 }
 
 #[test]
