@@ -2,20 +2,17 @@
 
 use super::error::FieldFitError;
 use super::field::{FieldFit, fit_field};
-use super::parameters::{FieldParameters, HELD};
-use super::posterior::temperature_errors;
+use super::parameters::FieldParameters;
 use super::sample_for_tests::{Run, parameters, stage};
 use super::terms::{COUNT, name};
-use super::update::{Change, update};
 use crate::estimator::model::Model;
 use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
 use crate::solve::{Projection, Solver, SolverOptions};
 use hallstage_input::dataset::{Dataset, LogSource, LoggedFrame};
 use hallstage_input::stage::Stage;
-use nalgebra::DMatrix;
 use runtime::frame::MISSING_CODE;
-use runtime::{ModelKind, RawFrame, Temperature};
+use runtime::{ModelKind, RawFrame};
 
 fn model_31(dataset: &Dataset, all: &[usize], stage: &Stage) -> Parameters {
     let options = SolverOptions::new(Projection::Linear, 1);
@@ -213,62 +210,5 @@ fn logs_at_nearly_one_temperature_leave_k_as_expected() {
             assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");
             assert_eq!(error[0], 3e-4);
         }
-    }
-}
-
-#[test]
-fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
-    let (old, truth) = (parameters(), [-0.9e-3, -1.3e-3, -1.6e-3]);
-    let mut temperature = Temperature {
-        per_mk: [[-1.2e-6, 0.0]; 3],
-        zero_mc: [20_000, 0],
-        reach_mk: [30_000, 0],
-    };
-    // Parameters to a millionth, k as expected of the magnets, no sensor on the body.
-    let deviation = |k: usize| match k.checked_sub(COUNT) {
-        None => 1e-6 * old.probes.as_flattened()[k].abs(),
-        Some(k) => [3e-4, HELD][k % 2],
-    };
-    let mut known = DMatrix::from_fn(COUNT + 6, COUNT + 6, |i, j| {
-        if i == j {
-            deviation(i) * deviation(i)
-        } else {
-            0.0
-        }
-    });
-    let mut errors = [[3e-4; 2]; 3];
-    for change_mk in [2_000, 4_000, 6_000] {
-        let run = Run::EIGHT_SECONDS;
-        let mut dataset = run.dataset(&old);
-        for row in &mut dataset.rows {
-            let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
-            let temperature_mc = [20_000 + change_mk, MISSING_CODE];
-            row.frame = LoggedFrame::from(frame.with_temperature_mc(temperature_mc));
-            for (signal, k) in row.signal_m.iter_mut().zip(truth) {
-                *signal *= 1.0 + k * f64::from(change_mk) * 1e-3;
-            }
-        }
-        dataset.compensate(temperature);
-        let drift_mm = run.drift.map(|x| x * 1e3);
-        let what = Change::Temperature;
-        let update = update(&dataset, &stage(), &old, Some(&known), what, drift_mm);
-        let update = update.expect("an update");
-        let found = temperature_errors(&update.posterior.covariance).expect("k and h");
-        for probe in 0..3 {
-            assert!(
-                found[probe][0] < 0.9 * errors[probe][0],
-                "{found:?} {errors:?}"
-            );
-            temperature.per_mk[probe][0] += 1e-3 * update.parameters.gain_per_k[probe][0];
-        }
-        (errors, known) = (found, update.posterior.covariance);
-    }
-    for (probe, truth) in truth.into_iter().enumerate() {
-        let (k, error) = (temperature.per_mk[probe][0] * 1e3, errors[probe][0]);
-        assert!(
-            // By the noise of the runs alone it would be 4.2e-6 to 5.0e-6.
-            error > 5.3e-6 && error < 1e-5 && (k - truth).abs() < 3.5 * error,
-            "{k:e} {truth:e} {error:e}"
-        );
     }
 }
