@@ -1,8 +1,8 @@
-//! One host: duration, a bad bus, resets, reports and refusals.
+//! One host: duration, a bad bus, faults, reports and refusals; and another that declares the servo on.
 
 use super::world::{World, flashed};
 use super::{KEY, NEW, OLD, SERIAL, activating, changed, for_serial, plan, undeclared};
-use hal_adapters::can::command::{Outcome, Request};
+use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
 use host_fit::bus::update::{RezeroSettings, UpdateError, UpdateSettings, Updated, on};
@@ -85,30 +85,6 @@ fn on_a_bad_bus(rate: u64) -> [u32; 2] {
         }
     }
     ends
-}
-
-#[test]
-fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_says_which() {
-    let (mut stored, mut refused) = (0, 0);
-    for at_ms in (0..900).step_by(3) {
-        let mut world = World::new(Some(KEY), &[], 5);
-        world.resets_us = vec![at_ms * 1_000];
-        match world.update(&plan(NEW)) {
-            Ok(updated) => {
-                stored += 1;
-                assert_eq!((updated.sequence, &world.newest()[..]), (1, NEW), "{at_ms}");
-            }
-            Err(error) => {
-                refused += 1;
-                // The servo may be on after a restart: it is not declared off again.
-                assert_eq!(error, UpdateError::ServoOn { declared: true }, "{at_ms}");
-                assert_eq!(world.newest(), OLD, "{at_ms}");
-                assert!(world.update(&plan(NEW)).is_ok(), "{at_ms}");
-            }
-        }
-        assert_eq!(world.node.records(), 1, "{at_ms}");
-    }
-    assert!(stored > 10 && refused > 3, "{stored} {refused}");
 }
 
 #[test]
@@ -273,4 +249,40 @@ fn a_stage_at_rest_is_zeroed_by_its_key_with_the_servo_off_on_a_bad_bus_too() {
             assert_eq!(world.node.is_zeroed(), is_zeroed, "{seed}");
         }
     }
+}
+
+#[test]
+fn a_servo_that_another_host_declares_on_is_not_declared_off_again() {
+    let (mut stored, mut refused) = (0, 0);
+    for after_ms in (60..1_000).step_by(10) {
+        let mut world = World::new(Some(KEY), &[], 4);
+        world.other_asks(after_ms * 1_000, Request::ServoOff { seconds: 0 }, 3);
+        match world.update(&plan(NEW)) {
+            Ok(updated) => {
+                stored += 1;
+                assert_eq!((updated.sequence, &world.newest()[..]), (1, NEW));
+            }
+            Err(error) => {
+                refused += 1;
+                assert_eq!(error, UpdateError::ServoOn { declared: true }, "{after_ms}");
+                assert_eq!(world.newest(), OLD, "{after_ms}");
+            }
+        }
+        let mut mailbox = Mailbox::default();
+        let declared = world.recording.iter().filter(|(_, frame)| {
+            let is_off = |request| matches!(request, Some(Request::ServoOff { seconds: 1.. }));
+            match mailbox.take(frame) {
+                Some(Ok(Content::Command(Command { request, .. }))) => is_off(request),
+                _ => false,
+            }
+        });
+        assert_eq!(declared.count(), 1, "{after_ms}");
+    }
+    assert!(stored > 10 && refused > 10, "{stored} {refused}");
+    // Once the blob is stored it waits.
+    let mut world = World::new(None, &[], 6);
+    world.other_asks(0, Request::ServoOff { seconds: 255 }, 3);
+    world.declares_on_once_stored = true;
+    let refused = world.update(&undeclared(activating(plan(NEW))));
+    assert_eq!(refused, Err(UpdateError::NotActivated { sequence: 1 }));
 }

@@ -1,8 +1,7 @@
 //! A host and a node on one bus, in memory: the host's own script against the firmware's own node, with a
-//! bad bus, a second host, resets, and a replayed recording.
+//! bad bus, a second host, and faults of the program.
 
 mod alone;
-mod hosts;
 mod world;
 
 use hal_adapters::can::update::Key;

@@ -35,7 +35,7 @@ pub struct World {
     /// The frames of the host, and when it sent them.
     pub recording: Vec<(u64, BusFrame)>,
     /// The frames of another host, in the order of time.
-    pub others: VecDeque<(u64, BusFrame)>,
+    others: VecDeque<(u64, BusFrame)>,
     /// Another host declares the servo on as soon as a blob was stored and the node hears again.
     pub declares_on_once_stored: bool,
     /// The user stops the script at this frame of the host.
@@ -45,8 +45,6 @@ pub struct World {
     /// Frames that the host has not received yet.
     heard: VecDeque<BusFrame>,
     pub overruns: u32,
-    /// The node is reset at these times.
-    pub resets_us: Vec<u64>,
     /// The program faults so long after it was first activated, us.
     pub faults_after_activation_us: Vec<u64>,
     /// Answers of the node that no host hears.
@@ -70,7 +68,6 @@ impl World {
             faults_us: Vec::new(),
             heard: VecDeque::new(),
             overruns: 0,
-            resets_us: Vec::new(),
             faults_after_activation_us: Vec::new(),
             loses: |_| false,
         }
@@ -104,11 +101,7 @@ impl World {
             self.faults_us.remove(0);
             self.fault();
         }
-        let is_due = self.resets_us.first().is_some_and(|at| *at <= self.now_us);
-        if is_due || self.node.is_to_be_reset() {
-            if is_due {
-                self.resets_us.remove(0);
-            }
+        if self.node.is_to_be_reset() {
             self.node.reset();
             let faults = self.faults_after_activation_us.drain(..);
             self.faults_us
