@@ -1,12 +1,10 @@
 //! Does a job, on the host and on the target alike.
 
 use super::{
-    ANSWER_WORDS, BLOB_WORDS, Bare, FIELD_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS,
-    PREDICTED, PredictingTracker, WORDS, answer, frame, from_words,
+    ANSWER_WORDS, BLOB_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PREDICTED, PredictingTracker, answer,
+    frame,
 };
-use runtime::{
-    BlobError, Decode, FieldModel, LinearModel, ParameterSet, PoseTracker, RawFrame, Reading,
-};
+use runtime::{BlobError, ParameterSet, PoseTracker, RawFrame, Reading};
 
 /// Frames of one transfer.
 const BATCH: usize = 512;
@@ -59,23 +57,17 @@ pub fn run<T: Transfer>(transfer: &mut T) -> Result<(), Stop<T::Fault>> {
         }
         fill(transfer, rest)?;
         let head = Head::from_words(head.map(u32::from_le_bytes));
-        match head.source {
-            WORDS => bare::<LinearModel, T>(transfer, &head)?,
-            FIELD_WORDS => bare::<FieldModel, T>(transfer, &head)?,
-            _ => {
-                let mut bytes = [0; 4 * BLOB_WORDS];
-                let length = head.parameter_words().ok_or(Stop::NoJob)? * 4;
-                let blob = bytes.get_mut(..length).ok_or(Stop::NoJob)?;
-                fill(transfer, blob)?;
-                let set = ParameterSet::from_flash(blob).map_err(Stop::Refused)?;
-                let mut tracker = PoseTracker::new(set.decoder(), head.on_invalid());
-                let mut predicting = PredictingTracker::new(tracker.clone());
-                frames(transfer, head.frames, |frame| match head.source {
-                    PREDICTED => predicting.tick(frame),
-                    _ => tracker.tick(frame),
-                })?;
-            }
-        }
+        let mut bytes = [0; 4 * BLOB_WORDS];
+        let length = head.parameter_words().ok_or(Stop::NoJob)? * 4;
+        let blob = bytes.get_mut(..length).ok_or(Stop::NoJob)?;
+        fill(transfer, blob)?;
+        let set = ParameterSet::from_flash(blob).map_err(Stop::Refused)?;
+        let mut tracker = PoseTracker::new(set.decoder(), head.on_invalid());
+        let mut predicting = PredictingTracker::new(tracker.clone());
+        frames(transfer, head.frames, |frame| match head.source {
+            PREDICTED => predicting.tick(frame),
+            _ => tracker.tick(frame),
+        })?;
     }
 }
 
@@ -84,16 +76,6 @@ fn fill<T: Transfer>(transfer: &mut T, bytes: &mut [u8]) -> Result<(), Stop<T::F
         true => Ok(()),
         false => Err(Stop::NoJob),
     }
-}
-
-/// Reads a decoder as bare words, and decodes.
-fn bare<M: Bare, T: Transfer>(transfer: &mut T, head: &Head) -> Result<(), Stop<T::Fault>> {
-    let mut words = [[0; 4]; PARAMETER_WORDS];
-    let count = head.parameter_words().ok_or(Stop::NoJob)?;
-    let taken = words.get_mut(..count).ok_or(Stop::NoJob)?;
-    fill(transfer, taken.as_flattened_mut())?;
-    let (decoder, zero) = from_words::<M>(&words.map(u32::from_le_bytes));
-    frames(transfer, head.frames, |frame| decoder.decode(frame, &zero))
 }
 
 /// Ticks through the frames of one section.

@@ -1,13 +1,13 @@
-//! Sections of a job: the rows of a log, uniform random codes, random words as parameters.
+//! Sections of a job: the rows of a log, random codes, random terms of the field model.
 
-use crate::job::{self, Bare, Head};
+use crate::job::{self, Head};
 use host_fit::input::dataset::Dataset;
 use nalgebra::RowVector3;
 use rand::{Rng, RngExt};
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::SensingAxes;
 use runtime::model::{FieldProbe, Probes, Sensitivity, Shape};
-use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose, RawFrame, Temperature};
+use runtime::{ModelKind, ParameterSet, RawFrame, Temperature};
 
 /// One section: parameters as they lie in the file, and the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,24 +56,6 @@ pub fn predicted(mut section: Section) -> Section {
     section
 }
 
-/// Frames run by a bare decoder with unchecked parameters.
-pub fn word_section<M: Bare>(decoder: &Decoder<M>, frames: Vec<RawFrame>) -> Section {
-    let mut parameters = Vec::new();
-    job::to_words(decoder, &PlanarPose::ZERO, &mut |word| {
-        parameters.extend(word.to_le_bytes());
-    });
-    Section {
-        head: Head {
-            source: M::SOURCE,
-            frames: count(&frames),
-            hold: 0,
-            blob_bytes: 0,
-        },
-        parameters,
-        frames,
-    }
-}
-
 fn count<T>(items: &[T]) -> u32 {
     u32::try_from(items.len()).unwrap_or(u32::MAX)
 }
@@ -115,43 +97,9 @@ pub fn wild_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
     (0..frames).map(frame).collect()
 }
 
-/// A word of a kind that arithmetic handles apart: any bits, subnormal, infinite, NaN (quiet
-/// or signalling), zero, huge, tiny or ordinary.
-fn odd_word(rng: &mut impl Rng) -> u32 {
-    let sign = rng.random_range(0..2u32) << 31;
-    let fraction = rng.random_range(1..1u32 << 23);
-    let number = match rng.random_range(0..9u32) {
-        0 => return rng.random(),
-        1 => fraction,
-        2 => f32::INFINITY.to_bits(),
-        3 => f32::NAN.to_bits() | fraction,
-        4 => f32::INFINITY.to_bits() | (fraction & 0x3f_ffff).max(1),
-        5 => 0,
-        6 => f32::MAX.to_bits() - fraction,
-        7 => f32::MIN_POSITIVE.to_bits() + fraction,
-        _ => 1f32.to_bits() + (rng.random_range(0..64u32) << 23) + fraction - (32 << 23),
-    };
-    sign | number
-}
-
-/// A sound decoder of which some words, or all, are replaced by odd ones.
-pub fn odd<M: Bare>(rng: &mut impl Rng, sound: &Decoder<M>) -> Decoder<M> {
-    let mut words = Vec::new();
-    job::to_words(sound, &PlanarPose::ZERO, &mut |word| words.push(word));
-    if rng.random_range(0..4u32) == 0 {
-        words.fill_with(|| odd_word(rng));
-    } else {
-        for _ in 0..rng.random_range(1..4) {
-            let place = rng.random_range(0..words.len());
-            words[place] = odd_word(rng);
-        }
-    }
-    job::from_words(&words).0
-}
-
 /// A probe of the field model with random terms: each adds up to a fiftieth of the signal
 /// where that is largest.
-pub fn field_probe(
+fn field_probe(
     rng: &mut impl Rng,
     sensitivity: &Sensitivity<f32>,
     lateral: [f32; 3],

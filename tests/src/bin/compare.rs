@@ -6,20 +6,18 @@ use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
+use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
-use runtime::{AnyDecoder, Decode, Decoder, ParameterSet};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tests::compare::{Comparison, compare, to_bytes};
-use tests::job::Bare;
 use tests::motion::{self, Section};
 
 /// Compares the words of a target with the host's, bit for bit.
 ///
-/// `make` writes the frames of a log, random codes and random parameters into a job file, for
-/// Model (31) and for the field model, with and without temperatures; an
-/// image that does the job on the target answers with a file of words; `check` compares them.
+/// `make` writes the frames of a log and random codes into a job file, for Model (31) and for the
+/// field model, with and without temperatures; an image that does the job on the target answers with a file of words; `check` compares them.
 #[derive(Parser)]
 struct Cli {
     #[command(subcommand)]
@@ -55,9 +53,9 @@ struct Make {
     /// Ticks of uniform random codes, with Model (31) and again with the field model.
     #[arg(long, default_value_t = 100_000)]
     codes: usize,
-    /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
-    #[arg(long, default_value_t = 32_000)]
-    parameters: usize,
+    /// Leave out the predicted poses.
+    #[arg(long)]
+    unpredicted: bool,
 }
 
 /// Longest hold of an invalid value, ticks.
@@ -78,7 +76,7 @@ fn read_blob(path: &Path) -> Result<ParameterSet, Box<dyn Error>> {
 }
 
 fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
-    let (codes, parameters) = (args.codes, args.parameters);
+    let codes = args.codes;
     let set = read_blob(&args.params)?;
     let dataset = match args.log.as_deref().zip(args.stage.as_deref()) {
         Some((log, stage)) => {
@@ -104,29 +102,16 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
         let blob = set.to_bytes(&mut buffer)?;
         let logged = motion::log_sections(blob, &dataset, HOLD)
             .ok_or("the log holds a vertical pose in place of capacitive codes")?;
-        let mut uniform = |ticks| {
-            let frames = motion::uniform_frames(&mut rng, ticks);
-            motion::blob_section(blob, frames, HOLD)
+        let uniform = |rng: &mut ChaCha8Rng, ticks| {
+            motion::blob_section(blob, motion::uniform_frames(rng, ticks), HOLD)
         };
         sections.extend(logged.iter().cloned());
-        sections.push(uniform(codes));
-        if parameters > 0 {
+        sections.push(uniform(&mut rng, codes));
+        let wild = motion::wild_frames(&mut rng, codes / 25);
+        sections.push(motion::blob_section(blob, wild, HOLD));
+        if !args.unpredicted {
             sections.extend(logged.into_iter().map(motion::predicted));
-            sections.push(motion::predicted(uniform(codes / 8)));
-        }
-        match warm.decoder() {
-            AnyDecoder::Linear(sound) => {
-                sections.extend(bare(&mut rng, &sound, parameters, |_| sound));
-            }
-            AnyDecoder::Field(sound) => {
-                let [a, b, c] = *sound.probes();
-                let other = |rng: &mut ChaCha8Rng| {
-                    let probes = [a, b, c]
-                        .map(|probe| motion::field_probe(rng, &probe.sensitivity, probe.lateral));
-                    Decoder::new(*sound.constants(), probes)
-                };
-                sections.extend(bare(&mut rng, &sound, parameters, other));
-            }
+            sections.push(motion::predicted(uniform(&mut rng, codes / 8)));
         }
     }
     let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
@@ -134,33 +119,6 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
     println!("RESULT job_log_rows={rows}");
     std::fs::write(&args.out, to_bytes(&sections))?;
     Ok(true)
-}
-
-/// Ticks with random parameters: sets of odd words, and any codes.
-fn bare<M: Bare>(
-    rng: &mut ChaCha8Rng,
-    sound: &Decoder<M>,
-    ticks: usize,
-    mut other: impl FnMut(&mut ChaCha8Rng) -> Decoder<M>,
-) -> Vec<Section> {
-    /// Frames that share one set of random parameters.
-    const FRAMES_PER_SET: usize = 32;
-    let mut sections = Vec::new();
-    for k in 0..ticks / FRAMES_PER_SET {
-        let decoder = other(rng);
-        let decoder = if k % 2 == 0 {
-            motion::odd(rng, &decoder)
-        } else {
-            decoder
-        };
-        let frames = motion::uniform_frames(rng, FRAMES_PER_SET);
-        sections.push(motion::word_section(&decoder, frames));
-    }
-    if ticks > 0 {
-        let wild = motion::wild_frames(rng, ticks / 8);
-        sections.push(motion::word_section(sound, wild));
-    }
-    sections
 }
 
 fn check(job: &Path, words: &Path) -> Result<bool, Box<dyn Error>> {

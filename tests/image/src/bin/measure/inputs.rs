@@ -1,10 +1,10 @@
 //! What is measured with: a sound stage, random codes, random parameters.
 
-use image::job::{self, Bare, FRAME_WORDS, PARAMETER_WORDS};
+use image::job::{self, FRAME_WORDS};
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
-use runtime::{PlanarPose, RawFrame, Temperature};
+use runtime::{Model, PlanarPose, RawFrame, Temperature};
 
 /// A sound stage, in round numbers.
 pub const SOUND: DecoderConstants<f32> = DecoderConstants {
@@ -101,17 +101,94 @@ pub fn codes(words: &mut Words, k: u32) -> RawFrame {
     }))
 }
 
+/// Words of constants, zero deviation and coefficients in the field model.
+const PARAMETER_WORDS: usize = 126;
+
+/// Reads a probe's coefficients one by one.
+type Probe<M> = fn(&mut dyn FnMut() -> f32) -> <M as Model>::Probe<f32>;
+
+/// A probe of Model (31).
+pub fn linear_probe(next: &mut dyn FnMut() -> f32) -> Sensitivity<f32> {
+    Sensitivity {
+        eta: next(),
+        per_z_m: next(),
+        per_rx_rad: next(),
+        per_ry_rad: next(),
+    }
+}
+
+/// A probe of the field model.
+pub fn field_probe(next: &mut dyn FnMut() -> f32) -> FieldProbe<f32> {
+    FieldProbe {
+        sensitivity: linear_probe(next),
+        carry: [next(), next(), next()],
+        shape: Shape {
+            u_w_w: [next(), next()],
+            u_w: [next(), next()],
+            u_z_z: [next(), next()],
+            u_u_u: [next(), next()],
+            u_u: [next(), next()],
+            w_w: [next(), next()],
+            w_z: [next(), next()],
+            z_z: [next(), next()],
+            u_u_w: next(),
+            w_w_w: next(),
+        },
+        lateral: [next(), next(), next()],
+    }
+}
+
+/// A decoder and a zero deviation of these words, unchecked.
+fn from_words<M: Model>(
+    words: [u32; PARAMETER_WORDS],
+    probe: Probe<M>,
+) -> (Decoder<M>, PlanarPose<f32>) {
+    let mut rest = words.into_iter();
+    let mut next = || rest.next().unwrap_or_default();
+    let mut window = || CodeWindow {
+        low: next() as i32,
+        high: next() as i32,
+    };
+    let (hall_window, capacitive_window) = (window(), window());
+    let mut pair = || [next(), next()];
+    let (zero_mc, reach_mk) = (pair().map(u32::cast_signed), pair());
+    let mut number = || f32::from_bits(next());
+    let sensitivity_min = number();
+    let mut three = || [number(), number(), number()];
+    let (vertical_per_code, planar_per_code) =
+        ([three(), three(), three()], [three(), three(), three()]);
+    let (calibrated_vertical, calibrated_planar) = (three(), three());
+    let mut two = || [number(), number()];
+    let constants = DecoderConstants {
+        vertical_per_code,
+        planar_per_code,
+        calibrated_vertical,
+        calibrated_planar,
+        sensitivity_min,
+        hall_window,
+        capacitive_window,
+        temperature: Temperature {
+            per_mk: [two(), two(), two()],
+            zero_mc,
+            reach_mk,
+        },
+    };
+    let mut three = || [number(), number(), number()];
+    let zero = PlanarPose::from_array(three());
+    let mut probe = || probe(&mut number);
+    (Decoder::new(constants, [probe(), probe(), probe()]), zero)
+}
+
 /// The decoder of one round: sound parameters, any words, or nothing but NaN.
-pub fn decoder_of<M: Bare>(
+pub fn decoder_of<M: Model>(
     words: &mut Words,
     k: u32,
     probes: [M::Probe<f32>; 3],
+    probe: Probe<M>,
 ) -> (Decoder<M>, PlanarPose<f32>) {
     match k % 3 {
         0 => (Decoder::new(SOUND, probes), PlanarPose::ZERO),
-        1 => job::from_words(&core::array::from_fn::<u32, PARAMETER_WORDS, _>(|_| {
-            words.next()
-        })),
-        _ => job::from_words(&[f32::NAN.to_bits(); PARAMETER_WORDS]),
+        1 => from_words(core::array::from_fn(|_| words.next()), probe),
+        _ => from_words([f32::NAN.to_bits(); PARAMETER_WORDS], probe),
     }
 }

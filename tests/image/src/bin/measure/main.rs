@@ -13,7 +13,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::{Coded, Layout, Message, SensorReceiver, Timing, sensor};
 use image::semihost::{CONSOLE, File, exit};
-use inputs::{FIELD_PROBES, PROBES, SOUND, Words, codes, decoder_of};
+use inputs::{FIELD_PROBES, PROBES, SOUND, Words, codes, decoder_of, field_probe, linear_probe};
 use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::Decoder;
 use runtime::model::{FieldProbe, Sensitivity};
@@ -237,7 +237,12 @@ fn main() -> ! {
     unsafe { counted_loop_1000() };
     for k in 0..300 {
         let frame = black_box(codes(&mut words, k));
-        let (decoder, zero) = black_box(decoder_of::<LinearModel>(&mut words, k, PROBES));
+        let (decoder, zero) = black_box(decoder_of::<LinearModel>(
+            &mut words,
+            k,
+            PROBES,
+            linear_probe,
+        ));
         let signal = Signal(frame.hall.map(|code| code as f32), [0.0; 3]);
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
@@ -255,7 +260,12 @@ fn main() -> ! {
             counted_c_kernel(&c, &signal, &vertical, &zero, &mut pose);
             counted_c_tick(&decoder, &frame, &zero, &mut reading);
         }
-        let (decoder, zero) = black_box(decoder_of::<FieldModel>(&mut words, k, FIELD_PROBES));
+        let (decoder, zero) = black_box(decoder_of::<FieldModel>(
+            &mut words,
+            k,
+            FIELD_PROBES,
+            field_probe,
+        ));
         let c = FieldKernel {
             planar_per_code: decoder.constants().planar_per_code,
             probes: *decoder.probes(),
