@@ -6,4 +6,6 @@ pub mod fit;
 pub mod judge;
 pub mod plan;
 pub mod recalibrate;
+#[cfg(test)]
+mod service_for_tests;
 pub mod words;

@@ -2,6 +2,7 @@
 //! calibration at the noise floor.
 
 use crate::fit::{FitSettings, ModelChoice, fit};
+use crate::service_for_tests::worst_ratio;
 use hallstage_input::shipped::STAGE_TOML;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::assembly::Assembly;
@@ -10,7 +11,7 @@ use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
-use runtime::{ModelKind, ParameterSet, VerticalPose};
+use runtime::{ModelKind, ParameterSet};
 
 const SEED: u64 = 2;
 
@@ -39,25 +40,14 @@ fn ratio_in_service(stage: &Stage) -> f64 {
     let set = ParameterSet::from_bytes(blob).expect("a sound blob");
     let parameters = FieldParameters::from_set(&set, stage).expect("a field model");
     let constants = parameters.constants(1.0).expect("regular");
-    let (mut squares, mut count) = ([0.0; 3], 0.0);
-    let service = Protocol::Service.run(stage.servo_period_s, SEED);
-    for pose in service.movements.iter().flatten().step_by(50) {
-        let signal_m = assembly.probes.map(|probe| probe.signal_m(pose));
-        let vertical = VerticalPose::from_array(pose.vertical);
-        let decoded = constants.decode(signal_m, &vertical).to_array();
-        for axis in 0..3 {
-            squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
-        }
-        count += 1.0;
-    }
-    let ratio = |axis: usize| {
+    let floor = [0, 1, 2].map(|axis| {
         let noise = |k: usize| {
             let eta = constants.probes[k].sensitivity.eta;
             (constants.pose_rows[axis][k] * SensorErrors::USUAL.hall_m / eta).powi(2)
         };
-        (1.0 + squares[axis] / count / (noise(0) + noise(1) + noise(2))).sqrt()
-    };
-    ratio(0).max(ratio(1)).max(ratio(2))
+        (noise(0) + noise(1) + noise(2)).sqrt()
+    });
+    worst_ratio(&constants, &assembly, SEED, floor)
 }
 
 #[test]

@@ -3,46 +3,39 @@
 
 use super::{Change, RecalibrateError, Recalibration, StoredPosterior, recalibrate};
 use crate::fit::{FitSettings, ModelChoice, fit};
+use crate::plan::run::PlannedRun;
+use crate::service_for_tests::worst_ratio;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped::STAGE_TOML;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::assembly::Assembly;
-use hallstage_simulate::pose::StagePose;
 use hallstage_simulate::probe::TrimmedProbe;
-use hallstage_simulate::protocol::{Protocol, Run, Trajectory};
+use hallstage_simulate::protocol::{Run, Trajectory};
 use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use nalgebra::Vector3;
 use runtime::parameters::Text;
-use runtime::{ModelKind, ParameterSet, VerticalPose};
-use std::f64::consts::TAU;
+use runtime::{ModelKind, ParameterSet};
 
 const SEED: u64 = 2;
 const RUN: [f64; 6] = [5.0, 8.0, 7.0, 6.0, 4.0, 7.5];
-/// Of two seconds.
+/// Cycles of a run of two seconds.
 const SINE_ALONG_Y: [f64; 6] = [0.0, 4.0, 0.0, 0.0, 0.0, 0.0];
 const ALL_AXES: [f64; 6] = [3.0, 4.0, 5.0, 2.0, 3.5, 2.5];
 
 /// A sine along each axis, with its number of cycles; an axis with 0 cycles stands still.
 fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
     const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
-    let pose = |row: u32| {
-        let t_s = f64::from(row) * 0.002;
-        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
-        let taper = end * end * (3.0 - 2.0 * end);
-        let at = |k: usize| {
-            let phase = TAU * cycles[k] * t_s / seconds + 1.7 * k as f64;
-            let moves = if cycles[k] > 0.0 { taper } else { 0.0 };
-            AMPLITUDES[k] * moves * libm::sin(phase)
-        };
-        StagePose {
-            planar: [at(0), at(1), at(2)],
-            vertical: [at(3), at(4), at(5)],
-        }
+    let amplitude = |k: usize| if cycles[k] > 0.0 { AMPLITUDES[k] } else { 0.0 };
+    let run = PlannedRun {
+        seconds,
+        taper_s: 0.5,
+        amplitudes: std::array::from_fn(amplitude),
+        cycles,
     };
-    (0..(seconds * 500.0) as u32).map(pose).collect()
+    run.trajectory(0.002)
 }
 
 struct Old {
@@ -89,23 +82,14 @@ impl Old {
     /// Errors in service of the changed stage over the noise floor, worst axis: with the old blob
     /// and with the new one.
     fn ratios(&self, now: &Assembly, new: &Recalibration) -> [f64; 2] {
-        let service = Protocol::Service.run(0.002, SEED);
         [&self.set, &new.set].map(|set| {
             let parameters = FieldParameters::from_set(set, &self.stage).expect("a field model");
-            let constants = parameters.constants(1.0).expect("sound");
-            let mut squares = [0.0; 3];
-            let mut count = 0.0;
-            for pose in service.movements.iter().flatten().step_by(50) {
-                let signal_m = now.probes.map(|probe| probe.signal_m(pose));
-                let vertical = VerticalPose::from_array(pose.vertical);
-                let decoded = constants.decode(signal_m, &vertical).to_array();
-                for axis in 0..3 {
-                    squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
-                }
-                count += 1.0;
-            }
-            let ratio = |k: usize| (1.0 + squares[k] / count / new.floor[k].powi(2)).sqrt();
-            ratio(0).max(ratio(1)).max(ratio(2))
+            worst_ratio(
+                &parameters.constants(1.0).expect("sound"),
+                now,
+                SEED,
+                new.floor,
+            )
         })
     }
 }

@@ -330,40 +330,31 @@ fn rows_in_which_a_gap_repeats_its_code_bend_no_calibration() {
     assert_eq!(diagnosis.verdict, Some(Verdict::Good));
 }
 
+/// A step of 25 um, 10 um, 5 um: at the probe, the gap and the beam. That of a beam ends with its movement.
 #[test]
-fn a_large_step_of_a_hall_probe_is_named_as_that_and_taken_off() {
-    let codes = (25e-6 / stage().hall.m_per_count).round() as i32;
-    let diagnosis = diagnosed(recording(4), |sample, _| sample.hall[0] += codes);
-    let first = &diagnosis.findings[0];
-    assert_eq!(
-        (first.code(), first.channel().as_deref(), first.severity),
-        (Code::Step, Some("hall_a"), Severity::Warn)
-    );
-    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
-}
-
-#[test]
-fn a_step_of_a_gap_stays_and_one_of_a_beam_ends_with_its_movement() {
-    let stage = stage();
-    let codes = (10e-6 / stage.capacitive.m_per_count).round() as i32;
-    let of_gap = found(recording(4), |sample, _| sample.capacitive[1] += codes);
-    assert_eq!(
-        (of_gap[0].code(), of_gap[0].channel().as_deref()),
-        (Code::Step, Some("cap_2"))
-    );
-    assert_eq!(severity(of_gap[0].cost.expect("a cost")), Severity::Refuse);
-    let of_beam = found(recording(4), |sample, is_second| {
-        if is_second {
-            sample.beams_nm[1] += 5000;
+fn a_step_of_a_channel_is_named_and_that_of_a_probe_taken_off() {
+    type Step = (&'static str, Severity, fn(&mut Sample, bool));
+    let steps: [Step; 3] = [
+        ("hall_a", Severity::Note, |sample, _| sample.hall[0] += 400),
+        ("cap_2", Severity::Refuse, |sample, _| {
+            sample.capacitive[1] += 640
+        }),
+        ("ifm_y1", Severity::Note, |sample, is_second| {
+            sample.beams_nm[1] += 5000 * i64::from(is_second)
+        }),
+    ];
+    for (channel, least, change) in steps {
+        let diagnosis = diagnosed(recording(4), change);
+        let is_step = |f: &&Finding| f.code() == Code::Step;
+        let step = diagnosis.findings.iter().find(is_step).expect("a step");
+        assert_eq!(step.channel().as_deref(), Some(channel));
+        assert!(severity(step.cost.unwrap_or(1.0)) >= least, "{step:?}");
+        match channel {
+            "hall_a" => assert_eq!(diagnosis.verdict, Some(Verdict::Good)),
+            "ifm_y1" => assert!((step.value().expect("um") - 5.0).abs() < 1.0, "{step:?}"),
+            _ => assert_eq!(diagnosis.findings[0].code(), Code::Step),
         }
-    });
-    let is_step = |f: &&Finding| f.code() == Code::Step;
-    let step = of_beam.iter().find(is_step).expect("a step");
-    assert_eq!(step.channel().as_deref(), Some("ifm_y1"));
-    assert!(
-        (step.value().expect("a size") - 5.0).abs() < 1.0,
-        "{step:?}"
-    );
+    }
 }
 
 #[test]
