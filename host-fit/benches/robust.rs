@@ -12,7 +12,6 @@ use host_fit::input::shipped::{self, LOG_GZ, RUN_GZ, SERVICE_GZ};
 use host_fit::input::stage::Stage;
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::robust::Loss;
-use host_fit::solver::solve::Solver;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::ModelKind;
@@ -72,7 +71,6 @@ fn rms_in_service(
     loss: Loss,
 ) -> Fallible<Axes> {
     let settings = FitSettings {
-        solver: Solver::Finished,
         loss,
         ..FitSettings::new(ModelChoice::Named(Model::from_kind(kind)))
     };

@@ -74,7 +74,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 /// `limit`, unless `force` is true; `ValueError` that names the argument that is wrong.
 #[pyfunction]
 #[pyo3(signature = (
-    log, *, model = "auto", solver = "shtlbo-lm", project = "linear", loss = None, train = None,
+    log, *, model = "auto", solver = "lm", project = "linear", loss = None, train = None,
     draw = "stratified", population = None, generations = None, seed = 1, serial = "", created = "",
     limit = None, force = false
 ))]

@@ -41,8 +41,8 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
     cal.save(folder / "p.bin")
     fit = {
         "log": log, "model": "31", "solver": "lm", "project": "linear", "loss": "none", "train": 100,
-        "draw": "plain", "population": 10, "generations": 2, "seed": 1, "start": None,
-        "serial": "a", "created": "b", "limit": "x=1um", "force": False,
+        "draw": "plain", "population": 10, "generations": 2, "seed": 1, "serial": "a",
+        "created": "b", "limit": "x=1um", "force": False,
     }  # fmt: skip
     tables = {
         "hall": {"h1x_m": 0.2}, "capacitive": {"m_per_count": 1e-8}, "interferometer": {"y_baseline_m": 0.1},

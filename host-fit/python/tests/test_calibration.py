@@ -210,7 +210,7 @@ def test_a_refused_log_raises_its_findings_and_is_fitted_by_force(run30: hs.Log)
         ({"loss": "l1"}, "loss"), ({"loss": "huber", "solver": "shtlbo"}, "loss"), ({"train": 0}, "train"),
         ({"draw": "x"}, "draw"), ({"population": 3}, "population"), ({"generations": 0}, "generations"),
         ({"serial": "s" * 33}, "serial"), ({"created": "s" * 33}, "created"), ({"limit": "x=1"}, "x=1"),
-        ({"model": "field", "solver": "lm"}, "solver"),
+        ({"model": "field", "solver": "shtlbo"}, "solver"),
     ],
 )  # fmt: skip
 def test_a_wrong_option_is_named(run30: hs.Log, wrong: dict[str, object], argument: str) -> None:

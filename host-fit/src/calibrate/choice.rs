@@ -87,8 +87,7 @@ impl Choice for Option<Layout> {
 
 impl Choice for Solver {
     fn all() -> Vec<(Self, &'static str, &'static str)> {
-        let named = Self::ALL.iter().map(|value| (*value, value.name(), ""));
-        named.collect()
+        Self::all().map(|value| (value, value.name(), "")).collect()
     }
 }
 

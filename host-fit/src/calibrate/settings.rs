@@ -31,11 +31,11 @@ pub fn choose_loss(
         (Solver::Search(_), Some(Loss::Huber | Loss::Cauchy)) => (
             "loss",
             format!(
-                "a search alone counts all rows alike: leave --solver {} out, or take --loss none",
+                "a search counts all rows alike: leave --solver {} out, or take --loss none",
                 solver.name()
             ),
         ),
-        (solver, _) if is_field && solver != Solver::Finished => (
+        (Solver::Search(_), _) if is_field => (
             "solver",
             "--model field has a solver of its own; leave --solver out".to_owned(),
         ),
@@ -45,7 +45,7 @@ pub fn choose_loss(
         ),
         (_, Some(loss)) => return Ok(loss),
         (Solver::Search(_), None) => return Ok(Loss::None),
-        (Solver::Finished | Solver::LeastSquares, None) => return Ok(Loss::Cauchy),
+        (Solver::LeastSquares, None) => return Ok(Loss::Cauchy),
     };
     Err(Mismatch { argument, problem })
 }

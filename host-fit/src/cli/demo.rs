@@ -26,7 +26,6 @@ use hallstage_simulate::sensors::SensorErrors;
 use hallstage_simulate::thermal::{Climate, Thermal};
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::robust::Loss;
-use hallstage_solver::solve::Solver;
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::ProbeGeometry;
 use runtime::tracker::OnInvalid;
@@ -135,7 +134,6 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let heights = paper.only(at_250_um);
     let fitted = |dataset: &Dataset, kind| {
         let settings = FitSettings {
-            solver: Solver::Finished,
             loss: Loss::None,
             ..FitSettings::new(ModelChoice::Named(Model::from_kind(kind)))
         };

@@ -34,9 +34,8 @@ pub(super) struct FitArgs {
     /// Measurement model.
     #[arg(long, value_name = "MODEL", value_parser = choice::<ModelChoice>(), default_value = "auto")]
     model: ModelChoice,
-    /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
-    /// alone, the others search only.
-    #[arg(long, value_name = "NAME", value_parser = choice::<Solver>(), default_value = Solver::Finished.name())]
+    /// Solver: `lm` is least squares, the others are the searches of the paper.
+    #[arg(long, value_name = "NAME", value_parser = choice::<Solver>(), default_value = Solver::LeastSquares.name())]
     solver: Solver,
     /// How much of the problem is solved in closed form.
     #[arg(long, value_parser = choice::<Projection>(), default_value = "linear")]
@@ -50,10 +49,10 @@ pub(super) struct FitArgs {
     /// How rows are drawn.
     #[arg(long, value_parser = choice::<Draw>(), default_value = "stratified")]
     draw: Draw,
-    /// Individuals of a population: 100 as in the paper, or 16 with --project linear.
+    /// Individuals of a search: 100 as in the paper, or 16 with --project linear.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
     population: Option<u32>,
-    /// Generations of a population: 100 as in the paper; with --project linear at most 1000,
+    /// Generations of a search: 100 as in the paper; with --project linear at most 1000,
     /// fewer once the fitness hardly falls any more.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     generations: Option<u32>,

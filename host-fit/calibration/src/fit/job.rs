@@ -61,10 +61,8 @@ impl<'a> Job<'a> {
 
     /// The field model where the log can carry it, else Model (31).
     fn best(&self) -> Result<Fit, FitError> {
-        let usual = matches!(
-            self.settings.solver,
-            Solver::Finished | Solver::LeastSquares
-        ) && self.settings.options.projection == Projection::Linear;
+        let usual = self.settings.solver == Solver::LeastSquares
+            && self.settings.options.projection == Projection::Linear;
         let reason = if usual {
             match self.fit_model(Model::from_kind(ModelKind::Field)) {
                 Ok(fit)
@@ -114,7 +112,7 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// The rows to use with their weights: all alike for a search alone, which has no weights, and where the
+    /// The rows to use with their weights: all alike for a search, which has no weights, and where the
     /// field model cannot be fitted at all.
     fn fitted_rows(&self) -> FittedRows {
         let alike = || FittedRows::alike(self.selected.clone());
@@ -170,7 +168,7 @@ impl<'a> Job<'a> {
                 let at_best = best.and_then(|best| Sandwich::new(&problem, &best.parameters));
                 at_best.and_then(|at_best| at_best.lag)
             }
-            Solver::Finished | Solver::LeastSquares => sandwich.lag,
+            Solver::LeastSquares => sandwich.lag,
         };
         let estimate = Estimate {
             lag,

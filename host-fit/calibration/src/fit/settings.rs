@@ -26,7 +26,7 @@ pub struct FitSettings {
     pub draw: Draw,
     /// How the problem is solved.
     pub solver: Solver,
-    /// How much rows count that the model does not explain; a search alone knows no such thing.
+    /// How much rows count that the model does not explain; a search counts all alike.
     pub loss: Loss,
     /// For the solver; its seed also draws the rows.
     pub options: SolverOptions,

@@ -67,7 +67,7 @@ def fit(
     log: Log,
     *,
     model: _Model = "auto",
-    solver: str = "shtlbo-lm",
+    solver: str = "lm",
     project: Literal["none", "delta", "linear"] = "linear",
     loss: Literal["cauchy", "huber", "none"] | None = None,
     train: int | None = None,

@@ -21,15 +21,15 @@ const LIMITS: Limits = Limits {
 /// Most fits until the ranges of the lever arms, which follow from the misalignments, settle.
 const ROUNDS_MAX: usize = 20;
 
-/// Least squares on all rows, from the best of the regression and the given starts; of a model
-/// without gains within the search ranges, since angles and lever arms would take what gains are off.
+/// Least squares on all rows, from the given start or else from a regression; of a model without
+/// gains within the search ranges, since angles and lever arms would take what gains are off.
 ///
 /// # Errors
 /// See [`SolveError`].
-pub fn solve(problem: &Problem, starts: &[Parameters]) -> Result<Solution, SolveError> {
-    let regression = regression(&problem.thinned(START_ROWS)).ok_or(SolveError::NoPlanarMotion)?;
-    let starts: Vec<Parameters> = starts.iter().copied().chain([regression]).collect();
-    fit(problem, &starts, !problem.model.fits_gain())
+pub fn solve(problem: &Problem, start: Option<Parameters>) -> Result<Solution, SolveError> {
+    let start = start.or_else(|| regression(&problem.thinned(START_ROWS)));
+    let start = start.ok_or(SolveError::NoPlanarMotion)?;
+    fit(problem, start, !problem.model.fits_gain())
 }
 
 /// The search range of every parameter; if not `within` them, only of those that stage.toml fixes.
@@ -84,10 +84,10 @@ fn unknowns(problem: &Problem, about: &Parameters, within: bool) -> Unknowns {
     unknowns
 }
 
-/// Least squares from the best of some starts, `within` the search ranges or not.
+/// Least squares from a start, `within` the search ranges or not.
 pub(super) fn fit(
     problem: &Problem,
-    starts: &[Parameters],
+    start: Parameters,
     within: bool,
 ) -> Result<Solution, SolveError> {
     let few = problem.thinned(START_ROWS);
@@ -97,12 +97,9 @@ pub(super) fn fit(
         let x = DVector::zeros(unknowns.basis.ncols());
         gauss_newton::solve(problem, &unknowns, x, Vec::new(), limits)
     };
-    // Ranges make minima of their own: each start goes down to its own.
     let steps = if within { LIMITS.steps } else { 0 };
     let look = Limits { steps, ..LIMITS };
-    let looked = starts.iter().filter_map(|start| descend(&few, start, look));
-    let best = looked.min_by(|a, b| a.normal.chi_squared().total_cmp(&b.normal.chi_squared()));
-    let mut at = best.ok_or(SolveError::NoUsableStart)?;
+    let mut at = descend(&few, &start, look).ok_or(SolveError::NoUsableStart)?;
     let mut steps = 0;
     let is_few = few.rows.rows.len() < problem.rows.rows.len() / 2;
     for problem in is_few.then_some(&few).into_iter().chain([problem]) {
@@ -120,7 +117,7 @@ pub(super) fn fit(
         delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
         parameters,
         cost: at.normal.chi_squared().max(0.0),
-        evaluations: starts.len() as u64 + 2 + u64::from(steps),
+        evaluations: 3 + u64::from(steps),
         history: Vec::new(),
         elapsed: Duration::ZERO,
         stopped: match at.reached {

@@ -51,7 +51,7 @@ fn truth_is_recovered_from_a_log_without_noise() {
         ..Protocol::exact(truth(), 40)
     };
     let dataset = exact.dataset(&stage);
-    let solution = solve(&model_31(&dataset, &stage), &[]).expect("a fit");
+    let solution = solve(&model_31(&dataset, &stage), None).expect("a fit");
     let pairs = solution.parameters.values.iter().zip(truth().values);
     for (k, (have, want)) in pairs.enumerate() {
         assert!(
@@ -99,14 +99,14 @@ fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends
     narrow.search.set("eta", eta);
     let dataset = noisy(7).dataset(&narrow);
     let problem = model_31(&dataset, &narrow);
-    let free = solve(&problem, &[]).expect("a fit");
+    let free = solve(&problem, None).expect("a fit");
     assert!((free.parameters.eta()[0] - 0.8671).abs() < 1e-3);
     let names: Vec<String> = at_limit(problem.stage, problem.model, &free.parameters)
         .into_iter()
         .map(|id| id.name())
         .collect();
     assert_eq!(names, ["eta_a"]);
-    let within = fit(&problem, &[free.parameters], true).expect("a fit");
+    let within = fit(&problem, free.parameters, true).expect("a fit");
     assert_eq!(within.parameters.eta()[0], 0.85);
     // Worse than free, better than the free optimum merely clipped.
     let mut clipped = free.parameters;
@@ -117,7 +117,7 @@ fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends
     eta[0].low = 0.85;
     eta[0].high = 0.85;
     narrow.search.set("eta", eta);
-    let held = solve(&model_31(&dataset, &narrow), &[]).expect("a fit");
+    let held = solve(&model_31(&dataset, &narrow), None).expect("a fit");
     assert_eq!(held.parameters.eta()[0], 0.85);
 }
 
@@ -139,6 +139,6 @@ fn a_probe_with_the_other_sign_is_found() {
         .rows
         .iter_mut()
         .for_each(|row| row.signal_m[1] *= -1.0);
-    let solution = solve(&model_31(&dataset, &stage), &[]).expect("a fit");
+    let solution = solve(&model_31(&dataset, &stage), None).expect("a fit");
     assert!((solution.parameters.eta()[1] + 0.7049).abs() < 1e-3);
 }

@@ -134,7 +134,7 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
     const ROUNDS: u32 = 15;
     const ROWS: usize = 4000;
     let mut problem = problem.thinned(ROWS);
-    let mut solution = solve(&problem, &[])?;
+    let mut solution = solve(&problem, None)?;
     for _ in 0..ROUNDS {
         let residuals = residuals_um(&problem, &solution.parameters);
         let movements = problem.rows.movement_rows();
@@ -143,7 +143,7 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
         for (row, weight) in rows.iter_mut().zip(weights) {
             row.weight = weight;
         }
-        solution = solve(&problem, &[solution.parameters])?;
+        solution = solve(&problem, Some(solution.parameters))?;
     }
     Ok(solution)
 }

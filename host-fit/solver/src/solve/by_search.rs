@@ -1,23 +1,11 @@
-//! A search on the fitness of a problem, with or without a least-squares finish.
-//!
-//! With a finish (the program's default, `shtlbo-lm`) the search runs on a few hundred rows, evenly
-//! from each movement, until it hardly improves. The least-squares fit on all rows then starts from its best
-//! individual. The result is the least-squares optimum for every seed; the search guards against a bad start.
+//! A search on the fitness of a problem.
 
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
 use super::{Projection, Solution, SolveError, SolverOptions};
-use crate::estimator::least_squares;
 use crate::estimator::problem::Problem;
 
-/// Rows for a search that a least-squares fit finishes.
-const FEW_ROWS: usize = 400;
-/// When a search that is finished by least squares has found the right neighbourhood.
-const NEAR: Stall = Stall {
-    generations: 8,
-    relative_decline: 1e-4,
-};
 /// When a search on the form `linear` is at the optimum: to 5e-7 of the fitness on each of 200
 /// seeds tried.
 const EXACT: Stall = Stall {
@@ -34,7 +22,7 @@ pub const fn default_size(projection: Projection) -> (usize, usize) {
     }
 }
 
-/// A search alone, on all rows of the problem.
+/// A search on all rows of the problem.
 ///
 /// # Errors
 /// See [`SolveError`].
@@ -55,43 +43,6 @@ pub fn solve(
         Projection::Linear => Some(EXACT),
         Projection::None | Projection::Delta => None,
     };
-    let found = search(kind, &objective, options, stall);
-    solution_of(problem, &objective, &found)
-}
-
-/// SHTLBO on few rows, then least squares on all.
-///
-/// # Errors
-/// See [`SolveError`].
-pub fn solve_finished(
-    problem: &Problem<'_>,
-    options: &SolverOptions,
-) -> Result<Solution, SolveError> {
-    let few = problem.thinned(FEW_ROWS);
-    // Where nothing nonlinear is left to search for, least squares alone is exact.
-    let projection = match options.projection {
-        Projection::Linear if !problem.model.fits_gain() => Projection::Delta,
-        other => other,
-    };
-    let Some(objective) = Objective::new(&few, projection) else {
-        return least_squares::solve(problem, &[]);
-    };
-    let found = search(SearchKind::Shtlbo, &objective, options, Some(NEAR));
-    let is_usable = found.cost.is_finite();
-    let start = is_usable.then(|| objective.parameters(&found.best));
-    let mut solution = least_squares::solve(problem, start.flatten().as_slice())?;
-    solution.evaluations += found.evaluations as u64;
-    solution.history = found.history;
-    solution.stopped = format!("search: {}; finish: {}", found.reason, solution.stopped);
-    Ok(solution)
-}
-
-fn search(
-    kind: SearchKind,
-    objective: &Objective<'_>,
-    options: &SolverOptions,
-    stall: Option<Stall>,
-) -> SearchResult {
     let first = objective.first_population(options.population, options.seed);
     let options = SearchOptions {
         first: &first,
@@ -99,7 +50,8 @@ fn search(
         watch: options.watch,
         ..SearchOptions::new(options.seed, options.population, options.generations)
     };
-    kind.minimize(objective, &options)
+    let found = kind.minimize(&objective, &options);
+    solution_of(problem, &objective, &found)
 }
 
 /// What a search found.

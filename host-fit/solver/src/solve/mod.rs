@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`objective`] | the fitness as a cost function of a search |
 //! | [`search`] | SHTLBO and its ablations, for any cost function |
-//! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
+//! | [`by_search`] | a search on the fitness |
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -65,31 +65,22 @@ impl Projection {
 /// A way to find the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
-    /// SHTLBO on a few hundred rows, then least squares on all: the best result.
-    Finished,
-    /// Least squares alone.
+    /// Least squares: the best result.
     LeastSquares,
-    /// A search alone.
+    /// A search.
     Search(SearchKind),
 }
 
 impl Solver {
     /// All of them, the default first.
-    pub const ALL: [Self; SearchKind::ALL.len() + 2] = {
-        let mut all = [Self::Finished; SearchKind::ALL.len() + 2];
-        all[1] = Self::LeastSquares;
-        let mut k = 0;
-        while k < SearchKind::ALL.len() {
-            all[k + 2] = Self::Search(SearchKind::ALL[k]);
-            k += 1;
-        }
-        all
-    };
+    pub fn all() -> impl Iterator<Item = Self> {
+        let searches = SearchKind::ALL.map(Self::Search);
+        [Self::LeastSquares].into_iter().chain(searches)
+    }
 
     /// The name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Finished => "shtlbo-lm",
             Self::LeastSquares => "lm",
             Self::Search(kind) => kind.name(),
         }
@@ -106,8 +97,7 @@ impl Solver {
     ) -> Result<Solution, SolveError> {
         let started = Instant::now();
         let mut solution = match self {
-            Self::Finished => by_search::solve_finished(problem, options)?,
-            Self::LeastSquares => least_squares::solve(problem, &[])?,
+            Self::LeastSquares => least_squares::solve(problem, None)?,
             Self::Search(kind) => by_search::solve(kind, problem, options)?,
         };
         solution.elapsed = started.elapsed();
