@@ -131,7 +131,7 @@ def imports():
     written = ["--stage", f"{IN}/shipped.toml", "--out", "joined.csv"]
     for layout in ("16", "24"):
         record = f"{IN}/bus-{layout}.log"
-        for what in ([], ["--estimate-offset"], ["--offset-us", "3000"]):
+        for what in ([], ["--offset-us", "3000"]):
             arguments = ["import", record, f"{IN}/interferometer.csv", "--layout", layout, *written, *what]
             yield Case(f"import, {layout} bits, {' '.join(what)}", arguments)
 

@@ -12,10 +12,11 @@ use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
-use host_fit::calibrate::{Outcome, Updated, log_warnings, other_scales};
+use host_fit::calibrate::{Outcome, Updated, other_scales};
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::StoredPosterior;
+use host_fit::calibration::words;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
@@ -361,7 +362,7 @@ impl Calibration {
                 (log, &self.designed),
                 stage_file,
                 of.outcome.subject(),
-                (log_warnings(log), &blob),
+                (words::messages(&log.warnings), &blob),
                 report,
             )
         })

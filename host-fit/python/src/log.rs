@@ -5,7 +5,7 @@ use crate::choice::chosen;
 use crate::error::{arrays_error, log_error, wrong};
 use crate::stage::Stage;
 use crate::work;
-use host_fit::calibrate::log_warnings;
+use host_fit::calibration::words;
 use host_fit::input::dataset::Row;
 use host_fit::input::log::layout::LogLayout;
 use host_fit::input::log::{
@@ -190,7 +190,7 @@ impl Log {
     /// What is odd about the logs, in words.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        log_warnings(&self.reading)
+        words::messages(&self.reading.warnings)
     }
 
     /// Time of the rows within their log, us: int64, (n,).

@@ -1,6 +1,5 @@
 //! A blob judged on logs with reference.
 
-use super::log_warnings;
 use crate::report::errors::RowErrors;
 use crate::report::result::{Circumstances, Judged, Report};
 use crate::report::verdict::{End, Subject};
@@ -116,7 +115,7 @@ impl Evaluation {
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
         let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
-        let mut warnings = log_warnings(&self.log);
+        let mut warnings = words::messages(&self.log.warnings);
         warnings.extend(counts.map(|found| words::message(&found)));
         let circumstances = Circumstances {
             warnings,

@@ -28,11 +28,6 @@ use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 use serde_json::json;
 
-/// The warnings of a log that is diagnosed, which reports another rate itself.
-pub fn log_warnings(log: &LogReading) -> Vec<String> {
-    words::messages(&log.warnings)
-}
-
 /// Why a blob is not of a stage: it was made for other scales of codes; `None` where it may be.
 pub fn other_scales(set: &ParameterSet, stage: &Stage) -> Option<String> {
     let (hall, capacitive) = (&set.hall, &set.capacitive);
@@ -68,7 +63,7 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
         "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
         "failure" => json!(fitted.err().map(ToString::to_string)),
         "refusal" => json!(refusal.as_ref().map(|refusal| WordedRefusal(refusal, &diagnosis.findings))),
-        "warnings" => json!(log_warnings(log)),
+        "warnings" => json!(words::messages(&log.warnings)),
         "verdict" => json!(diagnosis.verdict),
         "predicted" => json!(diagnosis.predicted),
         "findings" => json!(words::worded(&diagnosis.findings)),

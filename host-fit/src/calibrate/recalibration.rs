@@ -1,6 +1,5 @@
 //! What is said of a calibration that was brought up to date.
 
-use super::log_warnings;
 use crate::report::errors::{errors, pose};
 use crate::report::figure::{Group, figure, group};
 use crate::report::verdict::{End, Subject};
@@ -72,7 +71,7 @@ impl Updated {
 }
 
 fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
-    let mut warnings = log_warnings(log);
+    let mut warnings = words::messages(&log.warnings);
     let refused = codes_refused(new.judgement.undecoded);
     warnings.extend(refused.as_ref().map(words::message));
     if new.known.is_none() {

@@ -3,7 +3,7 @@
 use super::args::{Json, Logs};
 use super::interrupt;
 use super::report::{Report, finish};
-use crate::calibrate::{checked, log_warnings};
+use crate::calibrate::checked;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -97,7 +97,12 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     if refusal.is_none() && findings.iter().all(is_note) {
         terminal::print("no fault found\n")?;
     }
-    finish(outputs, &checked.tables(), &log_warnings(&log), &subject)?;
+    finish(
+        outputs,
+        &checked.tables(),
+        &words::messages(&log.warnings),
+        &subject,
+    )?;
     match &refusal {
         Some(refusal) => Err(HostError::rejected(words::refusal(refusal, findings))),
         None => Ok(()),

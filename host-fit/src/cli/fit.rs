@@ -4,7 +4,7 @@ use super::args::{Json, Logs, Threads, blob_text};
 use super::arguments::{choice, train};
 use super::interrupt;
 use super::report::finish;
-use crate::calibrate::{FitOrder, Limits, checked, choose_loss, log_warnings};
+use crate::calibrate::{FitOrder, Limits, checked, choose_loss};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
@@ -14,6 +14,7 @@ use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
+use hallstage_calibration::words;
 use hallstage_input::log::{BadRows, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::draw::Draw;
@@ -120,7 +121,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let subject = outcome.subject();
     args.report
         .add(&mut outputs, || source(args, of_log, subject, found))?;
-    let warnings = log_warnings(&log);
+    let warnings = words::messages(&log.warnings);
     let (Some((fit, report)), true) = (found, outcome.has_blob) else {
         finish(outputs, &[], &warnings, &subject)?;
         let cause = outcome.refusal_message().unwrap_or_default();

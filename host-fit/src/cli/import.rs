@@ -36,9 +36,6 @@ pub(super) struct ImportArgs {
     /// together.
     #[arg(long, value_name = "US", allow_negative_numbers = true)]
     offset_us: Option<f64>,
-    /// For scripts of earlier versions: the offset is always estimated.
-    #[arg(long, hide = true)]
-    estimate_offset: bool,
     /// How far from its start the offset is searched, s.
     #[arg(
         long,

@@ -1,7 +1,6 @@
 //! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
 
 use super::args::{Logs, blob_text};
-use crate::calibrate::log_warnings;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, make_folder};
@@ -10,6 +9,7 @@ use crate::report::provenance::Provenance;
 use crate::report::table::Table;
 use crate::report::verdict::{Subject, Summary};
 use clap::Args;
+use hallstage_calibration::words;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use runtime::parameters::Text;
@@ -71,7 +71,7 @@ impl Report {
             stage,
             dataset: &log.dataset,
             provenance,
-            warnings: log_warnings(log),
+            warnings: words::messages(&log.warnings),
             report: None,
         }
     }

@@ -60,11 +60,11 @@ pub fn write(path: &Path, set: &ParameterSet) -> Result<(), OutputError> {
 /// The blob of a set, to be written to `path`.
 ///
 /// # Errors
-/// [`OutputProblem::Failed`], which no set that [`write()`] would take leads to.
+/// [`OutputProblem::System`], which no set that [`write()`] would take leads to.
 pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError> {
     let mut buffer = [0; MAX_BYTES];
     // The buffer has the size that every blob fits into.
     let bytes = set.to_bytes(&mut buffer).map_err(std::io::Error::other);
-    let failed = |source| OutputError::new(path, OutputProblem::Failed(source));
+    let failed = |source| OutputError::new(path, OutputProblem::System(source));
     bytes.map(<[u8]>::to_vec).map_err(failed)
 }

@@ -27,30 +27,31 @@ pub enum OutputProblem {
     /// Named twice.
     #[error("also another output of this command; name another file")]
     IsOutput,
-    /// The target is a folder.
-    #[error("is a folder; name a file in it")]
-    IsFolder,
-    /// The folder of the target does not exist.
-    #[error("the folder does not exist; create it or name another")]
-    NoFolder,
-    /// The folder of the target is a file.
-    #[error("is not in a folder but below a file; name another folder")]
-    NotAFolder,
-    /// A record is never replaced.
-    #[error("exists already, and a record is never replaced; name another file, or move it away")]
-    Exists,
-    /// The target must not be written.
-    #[error("the file is read-only; make it writable or name another")]
-    ReadOnly,
-    /// The folder must not be written.
-    #[error("no permission to write: {0}; change the permissions of the folder or name another")]
-    NotPermitted(#[source] Error),
-    /// The disk is full.
-    #[error("no room: {0}; free some space or name another folder")]
-    Full(#[source] Error),
-    /// Anything else.
-    #[error("cannot be written: {0}; name another file")]
-    Failed(#[source] Error),
+    /// The system does not write it.
+    #[error("{}", in_words(.0))]
+    System(#[source] Error),
+}
+
+/// The error of the system and its remedy.
+fn in_words(error: &Error) -> String {
+    match error.kind() {
+        ErrorKind::IsADirectory => "is a folder; name a file in it".to_owned(),
+        ErrorKind::NotFound => "the folder does not exist; create it or name another".to_owned(),
+        ErrorKind::NotADirectory => {
+            "is not in a folder but below a file; name another folder".to_owned()
+        }
+        ErrorKind::AlreadyExists => {
+            "exists already, and a record is never replaced; name another file, or move it away"
+                .to_owned()
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => format!(
+            "no permission to write: {error}; change the permissions of file and folder, or name another"
+        ),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            format!("no room: {error}; free some space or name another folder")
+        }
+        _ => format!("cannot be written: {error}; name another file"),
+    }
 }
 
 impl OutputError {
@@ -62,31 +63,19 @@ impl OutputError {
         }
     }
 
-    /// The system's error in the user's terms.
+    /// The system's error.
     pub(super) fn from_system(path: &Path, source: Error) -> Self {
         // `tempfile` wraps the system's error and adds the name of the temporary file, which the user does not know.
         let source = match source.raw_os_error() {
             Some(_) => source,
             None => source.kind().into(),
         };
-        let problem = match source.kind() {
-            ErrorKind::AlreadyExists => OutputProblem::Exists,
-            ErrorKind::NotFound => OutputProblem::NoFolder,
-            ErrorKind::NotADirectory => OutputProblem::NotAFolder,
-            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-                OutputProblem::NotPermitted(source)
-            }
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
-                OutputProblem::Full(source)
-            }
-            _ => OutputProblem::Failed(source),
-        };
-        Self::new(path, problem)
+        Self::new(path, OutputProblem::System(source))
     }
 
     /// Whether the reader of a pipe closed it.
     pub(super) fn is_closed_pipe(&self) -> bool {
         let kind = ErrorKind::BrokenPipe;
-        matches!(&self.problem, OutputProblem::Failed(source) if source.kind() == kind)
+        matches!(&self.problem, OutputProblem::System(source) if source.kind() == kind)
     }
 }

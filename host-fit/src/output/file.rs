@@ -2,7 +2,7 @@
 
 use super::error::{OutputError, OutputProblem};
 use std::fs::{self, File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -243,16 +243,18 @@ pub(super) fn is_stream(path: &Path) -> bool {
 
 /// The file that an output replaces. Of a link it is the linked file, so that the link stays.
 fn target(path: &Path) -> Result<PathBuf, OutputError> {
-    let problem = match fs::metadata(path) {
-        _ if path.as_os_str().is_empty() => OutputProblem::NoName,
-        Ok(metadata) if metadata.is_dir() => OutputProblem::IsFolder,
-        Ok(metadata) if metadata.permissions().readonly() => OutputProblem::ReadOnly,
+    if path.as_os_str().is_empty() {
+        return Err(OutputError::new(path, OutputProblem::NoName));
+    }
+    let kind = match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => ErrorKind::IsADirectory,
+        Ok(metadata) if metadata.permissions().readonly() => ErrorKind::PermissionDenied,
         Ok(_) => return Ok(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
         // `out/` asks for a folder.
-        Err(_) if path.as_os_str().as_encoded_bytes().ends_with(b"/") => OutputProblem::IsFolder,
+        Err(_) if path.as_os_str().as_encoded_bytes().ends_with(b"/") => ErrorKind::IsADirectory,
         Err(_) => return Ok(path.to_owned()),
     };
-    Err(OutputError::new(path, problem))
+    Err(OutputError::from_system(path, kind.into()))
 }
 
 /// A new file in the folder of `target`, with the permissions of any new file.

@@ -30,6 +30,7 @@ pub use error::{OutputError, OutputProblem};
 pub use file::{Output, check_writable, is_standard, is_standard_output, keep_apart};
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and keeps its permissions. A link is
@@ -104,7 +105,10 @@ impl Outputs {
 /// [`OutputError`].
 pub fn make_folder(path: &Path) -> Result<(), OutputError> {
     if path.is_file() {
-        return Err(OutputError::new(path, OutputProblem::NotAFolder));
+        return Err(OutputError::from_system(
+            path,
+            ErrorKind::NotADirectory.into(),
+        ));
     }
     fs::create_dir_all(path).map_err(|source| OutputError::from_system(path, source))
 }

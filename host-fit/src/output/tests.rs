@@ -29,27 +29,22 @@ fn a_target_that_cannot_be_is_named_with_its_reason() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
     fs::write(at("file"), b"old").expect("written");
-    use OutputProblem::{IsFolder, NoFolder, NoName, NotAFolder};
-    type IsWhy = fn(&OutputProblem) -> bool;
-    let cases: [(PathBuf, IsWhy, &str); 5] = [
-        (folder.path().into(), |why| matches!(why, IsFolder), "in it"),
-        (at("new/"), |why| matches!(why, IsFolder), "in it"),
-        (
-            at("missing/params.bin"),
-            |why| matches!(why, NoFolder),
-            "create it",
-        ),
-        ("".into(), |why| matches!(why, NoName), "name a file"),
+    for (path, reason) in [
+        (folder.path().into(), "is a folder"),
+        (at("new/"), "is a folder"),
+        (at("missing/params.bin"), "the folder does not exist"),
+        ("".into(), "the name of the output is empty"),
         (
             at("file/params.bin"),
-            |why| matches!(why, NotAFolder) || !cfg!(unix),
-            "another",
+            if cfg!(unix) {
+                "below a file"
+            } else {
+                "another"
+            },
         ),
-    ];
-    for (path, is_why, remedy) in cases {
+    ] {
         let error = write_atomically(&path, b"new").expect_err("refused");
-        let is_named = is_why(&error.problem) && error.to_string().contains(remedy);
-        assert!(is_named, "{error}");
+        assert!(error.to_string().contains(reason), "{error}");
     }
     assert_eq!(names(folder.path()), ["file"]);
 }
@@ -64,7 +59,10 @@ fn a_read_only_file_stays_as_it_is() {
     locked.set_readonly(true);
     fs::set_permissions(&path, locked).expect("set");
     let error = write_atomically(&path, b"new").expect_err("refused");
-    assert!(matches!(error.problem, OutputProblem::ReadOnly), "{error}");
+    assert!(
+        error.to_string().contains("no permission to write"),
+        "{error}"
+    );
     assert_eq!(fs::read(&path).expect("readable"), b"old");
     fs::set_permissions(&path, writable).expect("set");
 }
@@ -111,15 +109,12 @@ fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     record.flush().expect("written");
     assert_eq!(lines(&path), 20_000);
     drop(record);
-    let again = RecordFile::create(&path);
-    assert!(matches!(
-        again.expect_err("there").problem,
-        OutputProblem::Exists
-    ));
+    let again = RecordFile::create(&path).expect_err("there");
+    assert!(again.to_string().contains("exists already"), "{again}");
     assert_eq!(lines(&path), 20_000);
     let missing = RecordFile::create(&folder.path().join("missing/bus.log"));
-    let missing = missing.expect_err("no folder").problem;
-    assert!(matches!(missing, OutputProblem::NoFolder));
+    let missing = missing.expect_err("no folder").to_string();
+    assert!(missing.contains("the folder does not exist"), "{missing}");
     let other = RecordFile::create(&folder.path().join("other.log")).expect("writable");
     other.discard();
     assert_eq!(names(folder.path()), ["bus.log"]);

@@ -65,27 +65,25 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
         "service" => per_axis(predicted),
         "parameters" => Value::from((0..COUNT).map(parameter).collect::<Map<_, _>>()),
         "least_determined" => worst,
-        "temperature" => json!(protocol.iter().map(warm_log).collect::<Vec<_>>()),
+        "temperature" => protocol.iter().map(warm_log).collect::<Vec<_>>(),
     }
 }
 
-/// A log at a temperature, and what is expected of a fit to all logs up to it.
-fn warm_log(log: &WarmLog) -> Value {
+/// A log at a temperature, and what is expected of a fit to all logs up to it: the standard errors of k and h, and the
+/// errors in service over the noise floor.
+fn warm_log(log: &WarmLog) -> Group {
     let [k, h] = log.error_per_k;
-    let at = |distance: usize| {
-        let [x, y, rz] = log.ratios[distance];
-        json!({ "x": x, "y": y, "rz": rz })
-    };
-    json!({
-        "log": log.name,
-        "seconds": log.seconds,
-        "mount_k": log.warmer_k[0],
-        "body_k": log.warmer_k[1],
-        "error_of_k_per_k": k,
-        "error_of_h_per_k": h,
-        "ratio_at_5_k": at(0),
-        "ratio_at_10_k": at(1),
-    })
+    let at = |distance: usize| per_axis(|axis| log.ratios[distance][axis]);
+    group! {
+        "log" => log.name,
+        "seconds" => log.seconds,
+        "mount_k" => log.warmer_k[0],
+        "body_k" => log.warmer_k[1],
+        "error_of_k_per_k" => k,
+        "error_of_h_per_k" => h,
+        "ratio_at_5_k" => at(0),
+        "ratio_at_10_k" => at(1),
+    }
 }
 
 /// How the logs of a protocol are made.
@@ -108,39 +106,6 @@ pub fn steps(protocol: &[WarmLog]) -> String {
 fn rounded(value: f64, digits: usize) -> f64 {
     let text = format!("{value:.*e}", digits - 1);
     text.parse().unwrap_or(value)
-}
-
-/// Predicted errors in service over the noise floor, after each log of a protocol.
-fn temperature_table(protocol: &[WarmLog]) -> Table {
-    let mut table = Table::new(
-        "temperature: standard errors, and errors in service over the noise",
-        &[
-            "k, %/K",
-            "h, %/K",
-            "X at 5 K",
-            "Y",
-            "Rz",
-            "X at 10 K",
-            "Y",
-            "Rz",
-        ],
-    );
-    for log in protocol {
-        let error = |error: f64| match error > 1e-8 {
-            true => Figure::from(rounded(error * 1e2, 3)),
-            false => Figure::None,
-        };
-        let ratios = log
-            .ratios
-            .iter()
-            .flatten()
-            .map(|ratio| Figure::from(rounded(*ratio, 3)));
-        table.row(
-            log.name,
-            log.error_per_k.map(error).into_iter().chain(ratios),
-        );
-    }
-    table
 }
 
 /// The tables of a plan: the run, errors predicted for service, standard errors.
@@ -187,6 +152,5 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
     let mut all = figures(plan, protocol, stage).tables();
     all.splice(1..1, [motion]);
     all.push(errors);
-    all.extend(Some(temperature_table(protocol)).filter(|table| !table.rows.is_empty()));
     all
 }

@@ -65,15 +65,6 @@ impl Zeros<'_> {
             Self::Refit | Self::Given(_) => "fit",
         }
     }
-
-    /// How a title names it.
-    pub const fn words(&self) -> &'static str {
-        match self {
-            Self::None => "no zero deviation taken off",
-            Self::Refit => "zero deviations refitted",
-            Self::Given(_) => "given zero deviations taken off",
-        }
-    }
 }
 
 /// A dataset decoded with one parameter set: to be judged in several ways.
