@@ -7,10 +7,8 @@ use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
 use host_fit::calibrate::{FitOrder, Limits, choose_loss};
-use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::diagnose::refusal::Refusal;
-use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
-use host_fit::calibration::words;
+use host_fit::calibration::fit::{FitSettings, ModelChoice};
 use host_fit::solver::estimator::draw::Draw;
 use host_fit::solver::estimator::robust::Loss;
 use host_fit::solver::solve::{Projection, Solver, SolverOptions};
@@ -46,20 +44,22 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     log.check_reference(py)?;
     let mut settings = FitSettings::new(ModelChoice::Auto);
     settings.options.watch = WATCH;
+    let order = FitOrder {
+        settings,
+        limits: Limits::default(),
+        is_kept: false,
+    };
     let (reading, stage) = (&log.reading, &log.designed);
-    let (diagnosis, refusal) = work::run(py, || {
-        let fitted = fit_rows(&reading.dataset, stage, &settings);
-        let diagnosis = diagnose_log(&reading.dataset, stage, fitted.as_ref());
-        let refusal = Refusal::from_fit(fitted.as_ref(), &diagnosis.findings);
-        (diagnosis, refusal)
+    let made = work::run(py, || {
+        let fitted = order.fit(reading, stage)?;
+        order.judge(fitted, reading, stage)
     })?;
-    let verdict = finding::figures(py, &diagnosis.verdict)?;
-    let findings = finding::list(py, &diagnosis.findings)?;
+    let outcome = made.map_err(|error| calibrate_error(&error))?;
+    let verdict = finding::figures(py, &outcome.diagnosis.verdict)?;
+    let findings = finding::list(py, &outcome.diagnosis.findings)?;
     let class = py.import("hallstage._results")?.getattr("Findings")?;
-    let why = refusal
-        .as_ref()
-        .map(|of| words::refusal(of, &diagnosis.findings));
-    class.call1((findings, verdict, why, refusal.as_ref().map(Refusal::code)))
+    let code = outcome.refusal.as_ref().map(Refusal::code);
+    class.call1((findings, verdict, outcome.refusal_message(), code))
 }
 
 /// Fits the calibration of a stage to logs, diagnoses them, and takes off the faults that can be: what
@@ -133,6 +133,7 @@ pub fn fit(
             .transpose()
             .map_err(|problem| wrong("limit", problem))?
             .unwrap_or_default(),
+        is_kept: true,
     };
     let stage = &log.designed;
     let made = work::run(py, || {

@@ -1,17 +1,21 @@
 //! A fit with the decisions around it.
 
 use super::Limits;
+use crate::report::errors::errors;
+use crate::report::figure::{Group, group};
 use crate::report::result::{Choice, Circumstances, Report};
+use crate::report::trusted::trusted;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::fit_checks::over_noise;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::diagnose::{Diagnosis, ERROR_TO_NOISE_MAX, diagnose_log};
 use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::recalibrate::StoredPosterior;
-use hallstage_calibration::words;
+use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::{Projection, SolveError, Solver};
+use serde_json::json;
 
 /// What a fit is asked for.
 #[derive(Clone, Debug)]
@@ -20,6 +24,8 @@ pub struct FitOrder {
     pub settings: FitSettings,
     /// Largest rms errors of X, Y, Rz: of the field model in service, of others over all rows.
     pub limits: Limits,
+    /// Whether the calibration is kept. `check` keeps nothing: faults of the log stay in the fit.
+    pub is_kept: bool,
 }
 
 /// Why nothing is known of a log.
@@ -46,6 +52,7 @@ pub struct Outcome {
     pub has_blob: bool,
     /// Whether the search was ended before its time.
     pub is_interrupted: bool,
+    is_kept: bool,
     limits: Limits,
 }
 
@@ -70,11 +77,14 @@ impl FitOrder {
             Err(error) if self.is_interrupted() => Err(CalibrateError::Interrupted(format!(
                 "nothing was written: {error}"
             ))),
+            Ok(_) if self.is_interrupted() && !self.is_kept => Err(CalibrateError::Interrupted(
+                "nothing was written".to_owned(),
+            )),
             fitted => Ok(fitted),
         }
     }
 
-    /// Diagnoses the log with its fit, repairs the calibration, and says whether it may be used.
+    /// Diagnoses the log with its fit, repairs a calibration that is kept, and says whether it may be used.
     ///
     /// # Errors
     /// See [`CalibrateError`].
@@ -86,7 +96,9 @@ impl FitOrder {
     ) -> Result<Outcome, CalibrateError> {
         let is_interrupted = self.is_interrupted();
         let diagnosis = diagnose_log(&log.dataset, stage, fitted.as_ref());
-        if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
+        if let (Some(repair), Some(predicted), true) =
+            (&diagnosis.repair, &diagnosis.predicted, self.is_kept)
+        {
             fitted = match fitted {
                 Ok(fit) => fit.repaired(&log.dataset, stage, repair, predicted),
                 failed => failed,
@@ -98,6 +110,7 @@ impl FitOrder {
             refusal: None,
             has_blob: false,
             is_interrupted,
+            is_kept: self.is_kept,
             limits: self.limits,
         };
         let refusal = match &outcome.fitted {
@@ -107,7 +120,7 @@ impl FitOrder {
                 .or_else(|| unfinished(fit, log).filter(|_| is_interrupted)),
         };
         let force = self.settings.force;
-        outcome.has_blob = outcome.fitted.is_ok() && (refusal.is_none() || force);
+        outcome.has_blob = self.is_kept && outcome.fitted.is_ok() && (refusal.is_none() || force);
         if let (Some(cause), true, false) = (&refusal, is_interrupted, outcome.has_blob) {
             let cause = words::refusal(cause, &outcome.diagnosis.findings);
             return Err(CalibrateError::Interrupted(format!(
@@ -168,6 +181,7 @@ impl Outcome {
     pub fn subject(&self) -> Subject<'_> {
         let end = match &self.refusal {
             Some(cause) if !self.has_blob => End::Failed(cause),
+            _ if !self.is_kept => End::Checked,
             _ if self.is_interrupted => End::Interrupted,
             _ => End::Written,
         };
@@ -178,6 +192,29 @@ impl Outcome {
             errors: self.fitted.as_ref().ok().map(|fit| &fit.judgement.errors),
             limits: self.limits.0,
             in_service: self.in_service().is_some(),
+        }
+    }
+
+    /// The figures of a log that no calibration is kept of: model and errors of the fit, null without a fit; why there is no
+    /// fit, null if there is one.
+    pub fn checked(&self, log: &LogReading) -> Group {
+        let (rows, movements) = log.dataset.read();
+        let (fit, diagnosis) = (self.fitted.as_ref().ok(), &self.diagnosis);
+        let refusal = self.refusal.as_ref();
+        group! {
+            "rows" => rows,
+            "judged_rows" => fit.map(|fit| fit.judgement.rows()),
+            "movements" => movements,
+            "skipped_rows" => log.skipped_rows,
+            "model" => fit.map(|fit| fit.model.name),
+            "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
+            "failure" => json!(self.fitted.as_ref().err().map(ToString::to_string)),
+            "refusal" => json!(refusal.map(|refusal| WordedRefusal(refusal, &diagnosis.findings))),
+            "warnings" => json!(words::messages(&log.warnings)),
+            "verdict" => json!(diagnosis.verdict),
+            "predicted" => json!(diagnosis.predicted),
+            "findings" => json!(words::worded(&diagnosis.findings)),
+            "trusted_inputs" => fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
         }
     }
 

@@ -3,21 +3,15 @@
 use super::args::{Json, Logs};
 use super::interrupt;
 use super::report::{Report, finish};
-use crate::calibrate::checked;
+use crate::calibrate::{FitOrder, Limits};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::report::result::{self, Circumstances, Judged};
-use crate::report::verdict::{End, Subject};
 use clap::Args;
-use hallstage_calibration::diagnose::refusal::Refusal;
-use hallstage_calibration::diagnose::{Diagnosis, diagnose_log};
-use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
-use hallstage_calibration::judge::Zeros;
+use hallstage_calibration::fit::{FitSettings, ModelChoice};
 use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::ReadOptions;
-use hallstage_solver::solve::{Projection, SolverOptions};
 use std::time::Instant;
 
 /// Arguments of `check`.
@@ -42,69 +36,36 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     interrupt::watch();
     let stage = args.logs.stage.read()?;
     let log = args.logs.read(&stage, ReadOptions::FIT)?;
-    let mut options = SolverOptions::new(Projection::Linear, 1);
-    options.watch = interrupt::watch();
-    let settings = FitSettings {
-        options,
-        ..FitSettings::new(ModelChoice::Auto)
+    let mut settings = FitSettings::new(ModelChoice::Auto);
+    settings.options.watch = interrupt::watch();
+    let order = FitOrder {
+        settings,
+        limits: Limits::default(),
+        is_kept: false,
     };
-    let fitted = terminal::timed("fit", || fit(&log.dataset, &stage, &settings));
-    if interrupt::is_requested() {
-        return Err(HostError::interrupted("nothing was written"));
-    }
-    let diagnosis = terminal::timed("diagnosis", || {
-        diagnose_log(&log.dataset, &stage, fitted.as_ref())
-    });
-    let findings = &diagnosis.findings;
-    let refusal = Refusal::from_fit(fitted.as_ref(), findings);
-    let fit = fitted.as_ref().ok();
-    let subject = Subject {
-        end: refusal.as_ref().map_or(End::Checked, End::Failed),
-        diagnosis: &diagnosis,
-        is_field: fit.is_some_and(|fit| fit.field.is_some()),
-        errors: fit.map(|fit| &fit.judgement.errors),
-        limits: [None; 3],
-        in_service: false,
-    };
+    let fitted = terminal::timed("fit", || order.fit(&log, &stage));
+    let fitted = fitted.map_err(HostError::from_calibrate)?;
+    let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
+    let outcome = outcome.map_err(HostError::from_calibrate)?;
+    let of_log = (&log, &stage);
+    let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
+    let (checked, subject) = (outcome.checked(&log), outcome.subject());
     let mut outputs = Outputs::default();
-    let checked = checked(&log, fitted.as_ref(), &diagnosis);
     args.json.add(&mut outputs, &checked)?;
-    let elapsed_s = started.elapsed().as_secs_f64();
-    let circumstances = Circumstances {
-        dataset: fit.map_or(&log.dataset, |fit| fit.rows(&log.dataset)),
-        ..Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default())
-    };
-    let judged = fit.map(|fit| {
-        let by_row = fit.errors_by_row(circumstances.dataset);
-        let judged = Judged {
-            set: &fit.set,
-            judgement: &fit.judgement,
-            zeros: Zeros::for_model(fit.model),
-            by_row: &by_row,
-            over_rows: fit.judgement.errors,
-        };
-        result::Report::from_judgement(judged, &circumstances)
-    });
     args.report.add(&mut outputs, || {
         let what = ("Check of a log", "");
-        let mut source = args
-            .report
-            .source(what, &args.logs, (&log, &stage), subject);
-        source.report = judged.as_ref();
+        let mut source = args.report.source(what, &args.logs, of_log, subject);
+        source.report = report.as_ref();
         Ok(source)
     })?;
     let is_note = |found: &Finding| found.severity == Severity::Note;
-    if refusal.is_none() && findings.iter().all(is_note) {
+    if outcome.refusal.is_none() && outcome.diagnosis.findings.iter().all(is_note) {
         terminal::print("no fault found\n")?;
     }
-    finish(
-        outputs,
-        &checked.tables(),
-        &words::messages(&log.warnings),
-        &subject,
-    )?;
-    match &refusal {
-        Some(refusal) => Err(HostError::rejected(words::refusal(refusal, findings))),
+    let warnings = words::messages(&log.warnings);
+    finish(outputs, &checked.tables(), &warnings, &subject)?;
+    match outcome.refusal_message() {
+        Some(refusal) => Err(HostError::rejected(refusal)),
         None => Ok(()),
     }
 }

@@ -4,7 +4,7 @@ use super::args::{Json, Logs, Threads, blob_text};
 use super::arguments::{choice, train};
 use super::interrupt;
 use super::report::finish;
-use crate::calibrate::{FitOrder, Limits, checked, choose_loss};
+use crate::calibrate::{FitOrder, Limits, choose_loss};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
@@ -102,6 +102,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let order = FitOrder {
         settings: settings(args, loss),
         limits: args.limit.unwrap_or_default(),
+        is_kept: true,
     };
     let fitted = terminal::timed("fit", || order.fit(&log, &stage));
     let fitted = fitted.map_err(HostError::from_calibrate)?;
@@ -112,8 +113,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let mut outputs = Outputs::default();
     match &report {
         None => {
-            let checked = checked(&log, outcome.fitted.as_ref(), &outcome.diagnosis);
-            args.json.add(&mut outputs, &checked)?;
+            args.json.add(&mut outputs, &outcome.checked(&log))?;
         }
         Some(report) => args.json.add(&mut outputs, report)?,
     }

@@ -1,6 +1,6 @@
 //! Why a calibration is not to be used, as data.
 
-use crate::fit::{Fit, FitError};
+use crate::fit::FitError;
 use crate::judge::identify::FitFailure;
 use crate::judge::verdict::is_refused;
 use hallstage_input::axis::Axis;
@@ -73,14 +73,6 @@ impl Refusal {
     /// The refusal of a log with these findings, if there is a reason.
     pub fn from_findings(findings: &[Finding]) -> Option<Self> {
         is_refused(findings).then_some(Self::Findings)
-    }
-
-    /// The refusal of a log by its fit and its findings, if there is a reason.
-    pub fn from_fit(fitted: Result<&Fit, &FitError>, findings: &[Finding]) -> Option<Self> {
-        match fitted {
-            Ok(_) => Self::from_findings(findings),
-            Err(error) => Some(Self::no_fit(error, findings)),
-        }
     }
 
     /// Its name in JSON, which is stable.
