@@ -46,7 +46,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Of a fit that has a blob, with its report.
+    /// The calibration of a fit that has a blob, with its report.
     pub fn from_fit(
         outcome: Outcome,
         report: Report,

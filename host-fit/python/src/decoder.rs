@@ -71,9 +71,9 @@ impl Decoder {
     /// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). What is invalid is 0, or
     /// the last valid pose for at most `hold` rows.
     ///
-    /// Of codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers, (n, 3), a row every
+    /// Give codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers, (n, 3), a row every
     /// servo period; `mount`, `body`: temperatures, degC, (n,), NaN where there is none. int32 in C order
-    /// is read where it lies. Or of a `log`: all its rows, as `host-fit decode` does; a gap in its times
+    /// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
     /// shows as missed frames.
     ///
     /// Raises `ValueError` with the name of an argument of wrong shape or dtype.

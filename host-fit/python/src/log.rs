@@ -28,7 +28,7 @@ pub enum Source {
 
 /// Logs of a stage, read and checked: rows in SI units, by movement.
 ///
-/// Of more than 125,000 rows it holds a sample, of whole runs; `fit` works on these. `evaluate` and a decoder
+/// If there are more than 125,000 rows, it holds a sample, of whole runs; `fit` works on these. `evaluate` and a decoder
 /// go through all rows. Made by `read_log` and `Log.from_arrays`.
 #[pyclass(frozen, subclass, module = "hallstage")]
 pub struct Log {
@@ -290,7 +290,7 @@ const MOUNT: &str = "mount_c";
 const BODY: &str = "body_c";
 
 impl Log {
-    /// Of the text of a log, and where its columns come from if arrays made it: name in the header and name
+    /// A log from its text, and where its columns come from if arrays made it: name in the header and name
     /// of the argument.
     pub fn from_text(
         py: Python<'_>,

@@ -3,7 +3,7 @@
 use super::Limits;
 use crate::report::errors::errors;
 use crate::report::figure::{Group, group};
-use crate::report::result::{Choice, Circumstances, Report};
+use crate::report::result::{Circumstances, Report};
 use crate::report::trusted::trusted;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::fit_checks::over_noise;
@@ -14,7 +14,7 @@ use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
-use hallstage_solver::solve::{Projection, SolveError, Solver};
+use hallstage_solver::solve::SolveError;
 use serde_json::json;
 
 /// What a fit is asked for.
@@ -226,22 +226,12 @@ impl Outcome {
         elapsed_s: f64,
     ) -> Option<Report> {
         let fit = self.fitted.as_ref().ok()?;
-        let settings = &order.settings;
-        let (solver, project) = match fit.field {
-            Some(_) => (Solver::LeastSquares, Projection::Linear),
-            None => (settings.solver, settings.options.projection),
-        };
-        let choice = Choice {
-            solver: solver.name(),
-            project: project.name(),
-            seed: settings.options.seed,
-        };
         let diagnosis = self.diagnosis.clone();
         let circumstances = Circumstances {
             dataset: fit.rows(&log.dataset),
             ..Circumstances::new(log, stage, elapsed_s, diagnosis)
         };
-        let mut report = Report::from_fit(fit, &choice, &circumstances);
+        let mut report = Report::from_fit(fit, &order.settings, &circumstances);
         report.set_refusal(self.refusal.as_ref());
         Some(report)
     }

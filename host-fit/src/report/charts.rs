@@ -184,7 +184,7 @@ pub struct Density {
 }
 
 impl Density {
-    /// Of errors by row of a dataset, m, m, rad, with this time between rows, s. Rows without a pose count
+    /// The density of errors by row of a dataset, m, m, rad, with this time between rows, s. Rows without a pose count
     /// as zero. `None` where no movement is long enough.
     pub fn new(dataset: &Dataset, period_s: f64, errors: &RowErrors) -> Option<Self> {
         let movements: Vec<Range<usize>> = (dataset.movements.iter())

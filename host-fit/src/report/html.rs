@@ -41,7 +41,7 @@ pub struct Cause<'a> {
 }
 
 impl<'a> Cause<'a> {
-    /// Of findings in order, the most severe first.
+    /// Findings in order, the most severe first.
     pub fn of(findings: &'a [Finding]) -> Vec<Self> {
         let mut causes: Vec<Self> = Vec::new();
         for found in findings {

@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct Provenance(pub Table);
 
 impl Provenance {
-    /// Of a run of this program with these arguments, the name of the program first; no absolute path.
+    /// The command, by the arguments of this program, its own name first, and the version; no absolute path.
     pub fn new(arguments: impl Iterator<Item = OsString>) -> Self {
         let words = arguments.skip(1);
         let words: Vec<String> = words.map(|word| quoted(&without_folder(&word))).collect();

@@ -2,12 +2,12 @@
 
 use super::errors::{RowErrors, errors, errors_per_degree, errors_per_log};
 use super::field;
-use super::figure::{Group, Item, bare, figure, group};
+use super::figure::{Figure, Group, Item, bare, figure, group};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
 use super::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
-use hallstage_calibration::fit::Fit;
+use hallstage_calibration::fit::{Fit, FitSettings};
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::{Judgement, Zeros};
 use hallstage_calibration::words::{self, WordedRefusal};
@@ -18,9 +18,10 @@ use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::solve::{Projection, Solver};
 use runtime::ParameterSet;
 use serde::{Serialize, Serializer};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 
 /// How well a blob describes logs, and the results of the fit.
@@ -88,17 +89,6 @@ impl<'a> Circumstances<'a> {
     }
 }
 
-/// How a fit was made.
-#[derive(Clone, Debug)]
-pub struct Choice {
-    /// Name of the solver.
-    pub solver: &'static str,
-    /// How much was projected out.
-    pub project: &'static str,
-    /// Seed.
-    pub seed: u64,
-}
-
 /// A blob judged on logs.
 #[derive(Clone, Copy, Debug)]
 pub struct Judged<'a> {
@@ -113,16 +103,6 @@ pub struct Judged<'a> {
     /// Errors over these rows.
     pub over_rows: PoseError,
 }
-
-/// Members of a fit that programs may look up in any report; null in a judgement.
-const FIT_ONLY: [&str; 6] = [
-    "model_reason",
-    "solver",
-    "project",
-    "seed",
-    "evaluations",
-    "errors_solver_delta",
-];
 
 impl Report {
     /// The report of a blob that was judged.
@@ -156,7 +136,7 @@ impl Report {
         let parameters = parameters_in(set);
         let zero_deviations = zero_deviations(c.dataset, judgement);
         let places_m = Parameters::from_set(set).nearest_places_m(c.stage);
-        let mut figures = group! {
+        let figures = group! {
             "model" => Model::from_kind(set.model).name,
             "rows" => rows,
             "judged_rows" => judgement.rows(),
@@ -180,10 +160,14 @@ impl Report {
             "findings" => json!(words::worded(&c.diagnosis.findings)),
             "logs" => several(errors_per_log(c.dataset, judgement)),
             "trusted_inputs" => trusted(set),
+            // Programs may look these up in any report.
+            "model_reason" => Figure::None,
+            "solver" => Figure::None,
+            "project" => Figure::None,
+            "seed" => Figure::None,
+            "evaluations" => Figure::None,
+            "errors_solver_delta" => Figure::None,
         };
-        FIT_ONLY
-            .iter()
-            .for_each(|name| figures.set(name, Value::Null));
         Self {
             set: set.clone(),
             figures,
@@ -215,7 +199,11 @@ impl Report {
     /// | `errors_solver_delta` | errors with the solver's own zero deviations |
     /// | `field` | figures of a fit of the field model; null for other models |
     /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
-    pub fn from_fit(fit: &Fit, choice: &Choice, c: &Circumstances) -> Self {
+    pub fn from_fit(fit: &Fit, settings: &FitSettings, c: &Circumstances) -> Self {
+        let (solver, projection) = match fit.field {
+            Some(_) => (Solver::LeastSquares, Projection::Linear),
+            None => (settings.solver, settings.options.projection),
+        };
         let by_row = fit.errors_by_row(c.dataset);
         let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
         let of_31 = estimate.parameters.model_31();
@@ -262,9 +250,9 @@ impl Report {
             "coordinates" => json!(coordinates(places_m)),
             "warnings" => json!(report.warnings),
             "model_reason" => fit.model_reason.as_str(),
-            "solver" => choice.solver,
-            "project" => choice.project,
-            "seed" => choice.seed,
+            "solver" => solver.name(),
+            "project" => projection.name(),
+            "seed" => settings.options.seed,
             "evaluations" => estimate.evaluations,
             "solver_s" => json!(estimate.elapsed.as_secs_f64()),
             "stopped" => estimate.stopped.as_str(),

@@ -61,7 +61,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of a run.
+    /// The summary of a run.
     pub fn new(of: &Subject) -> Self {
         let predicted = of.diagnosis.predicted.as_ref();
         let verdict = of.diagnosis.verdict;
@@ -87,7 +87,7 @@ impl Summary {
 
     /// The summary on a terminal: a line, the table, a line.
     pub fn as_text(&self) -> String {
-        // Of a refusal the error that ends the command says the reason.
+        // The error that ends the command says why it is refused.
         let sentence = match self.word {
             "Refused" => String::new(),
             _ => format!(": {}", self.sentence),

@@ -130,7 +130,7 @@ impl Import {
         run(&self.settings).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Of an import that is refused, and writes nothing.
+    /// Imports, sees that it is refused, and that nothing is written.
     #[track_caller]
     pub(super) fn refused(&self, is_why: impl Fn(&ImportError) -> bool) -> String {
         let error = run(&self.settings).expect_err("refused");
