@@ -84,25 +84,3 @@ impl DelayNs for Sleep {
         std::thread::sleep(Duration::from_nanos(ns.into()));
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use hal_adapters::can::{SensorReceiver, Timing};
-
-    #[test]
-    fn a_receiver_gets_the_codes_of_every_tick() {
-        let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
-        let mut ticks = 0;
-        run(&mut Simulated, 20, |time_us, frame| {
-            let taken = receiver.take(&frame, time_us);
-            assert_eq!(taken.fault, None);
-            let Some(frame) = taken.tick else { return };
-            assert_eq!(frame.hall, [0, 100, 200]);
-            assert_eq!(frame.capacitive, [300, 400, 500]);
-            ticks += 1;
-        })
-        .expect("a simulated part has no faults");
-        assert_eq!(ticks, 20);
-    }
-}
