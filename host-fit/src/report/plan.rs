@@ -77,10 +77,10 @@ fn warm_log(log: &WarmLog) -> Group {
     group! {
         "log" => log.name,
         "seconds" => log.seconds,
-        "mount_k" => log.warmer_k[0],
-        "body_k" => log.warmer_k[1],
-        "error_of_k_per_k" => k,
-        "error_of_h_per_k" => h,
+        "mount" => figure(log.warmer_k[0], "K"),
+        "body" => figure(log.warmer_k[1], "K"),
+        "error_of_k" => figure(k, "1/K"),
+        "error_of_h" => figure(h, "1/K"),
         "ratio_at_5_k" => at(0),
         "ratio_at_10_k" => at(1),
     }
