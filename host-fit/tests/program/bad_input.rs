@@ -148,7 +148,7 @@ fn wrong_usage_ends_with_status_2() {
         "fit log.csv --out p.bin --solver magic",
         "fit log.csv --out p.bin --solver shtlbo --model 30",
         "fit log.csv --out p.bin --solver shtlbo --model 31 --loss cauchy",
-        "fit log.csv --out p.bin --model field --solver lm",
+        "fit log.csv --out p.bin --model field --solver shtlbo",
         "fit log.csv --out p.bin --model field --project none",
         "fit log.csv --out p.bin --train 0",
         "fit log.csv --out p.bin --seed -1",
