@@ -196,7 +196,7 @@ def test_a_refused_log_raises_its_findings_and_is_fitted_by_force(run30: hs.Log)
     log = arrays_of(run30, hall=inverted)
     with pytest.raises(hs.LogRefused, match="refused") as raised:
         hs.fit(log)
-    assert raised.value.code == "findings" and raised.value.findings[0].code == "channel_inverted"
+    assert raised.value.code == "no_fit" and raised.value.findings[0].code == "channel_inverted"
     with pytest.raises(hs.LogRefused, match="limit"):
         hs.fit(run30, limit="x=0.1um")
     forced = hs.fit(run30, limit="x=0.1um", force=True)
