@@ -71,8 +71,8 @@ pub struct SocketCan {
 }
 
 impl SocketCan {
-    /// Opens an interface and asks the kernel for the frames of `messages` of this node only. They
-    /// are received and sent as those of the table.
+    /// Opens an interface and asks the kernel for the frames of `messages` of this node only. The
+    /// caller sees frames with the identifiers of the table; the bus carries the identifiers of the node.
     ///
     /// # Errors
     /// All variants except `QueueFull`. An interface that is down can be opened; the first read
