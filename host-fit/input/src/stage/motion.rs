@@ -4,6 +4,7 @@
 //! ```toml
 //! [motion]
 //! x = { service_m = 500e-6, amplitude_m = 450e-6, speed_m_per_s = 2e-3, acceleration_m_per_s2 = 0.03 }
+//! y = { service_m = 800e-6, service_rms_m_per_s = 5e-3, service_rms_m_per_s2 = 0.2 }
 //! rx = { service_rad = 300e-6, speed_rad_per_s = 1e-3 }
 //! ```
 
@@ -16,11 +17,15 @@ use crate::axis::{AXES, Axis};
 pub struct AxisMotion {
     /// Largest magnitude in service.
     pub service: f64,
+    /// Speed in service, rms; by default that of a sine over half the range of service at 0.3 to 2 Hz.
+    pub service_speed_rms: f64,
+    /// Acceleration in service, rms; by default that of those sines.
+    pub service_acceleration_rms: f64,
     /// Largest magnitude in a calibration run; by default equal to `service`.
     pub amplitude: f64,
-    /// Largest speed; by default the speed of a sine over the range of service at 1 Hz.
+    /// Largest speed in a calibration run; by default the speed of a sine over the range of service at 1 Hz.
     pub speed: f64,
-    /// Largest acceleration; by default the acceleration of a sine over half the range of service at 2 Hz.
+    /// Largest acceleration in a calibration run; by default the acceleration of a sine over half the range of service at 2 Hz.
     pub acceleration: f64,
 }
 
@@ -34,6 +39,10 @@ pub struct Motion {
 /// Default range in service by axis, m or rad: the range of the given logs.
 const SERVICE: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
 
+/// Default rms speed (1/s) and rms acceleration (1/s2) over range of service: those of sines over half the
+/// range, all frequencies f from 0.3 to 2 Hz equally likely, 2 pi f / sqrt(8) and (2 pi f)^2 / sqrt(8). The
+/// given logs of service have 2.73 and 26.6.
+const SERVICE_RMS: [f64; 2] = [2.8, 27.0];
 /// Default speed over range of service, 1/s: 2 pi 1 Hz. The fastest motion of the given logs,
 /// sines over half the range at up to 2 Hz, has the same.
 const SPEED: f64 = std::f64::consts::TAU;
@@ -49,6 +58,8 @@ impl AxisMotion {
     const fn within(service: f64) -> Self {
         Self {
             service,
+            service_speed_rms: SERVICE_RMS[0] * service,
+            service_acceleration_rms: SERVICE_RMS[1] * service,
             amplitude: service,
             speed: SPEED * service,
             acceleration: ACCELERATION * service,
@@ -69,19 +80,21 @@ pub(super) fn motion(document: &Document<'_>) -> Result<Motion, StageError> {
     let mut motion = Motion::default();
     for (motion, Axis { key, unit, .. }) in motion.axes.iter_mut().zip(AXES) {
         let table = format!("motion.{key}");
-        let keys = ["service", "amplitude", "speed", "acceleration"];
-        let per = ["", "", "_per_s", "_per_s2"];
-        let names = [0, 1, 2, 3].map(|k| format!("{}_{unit}{}", keys[k], per[k]));
-        let or = |k: usize, default: f64, range| -> Result<f64, StageError> {
-            let unit = format!("{unit}{}", ["", "", "/s", "/s2"][k]);
-            let given = document.number(&table, &names[k], range, &unit)?;
+        let or = |key: &str, derivative: usize, default: f64, range| -> Result<f64, StageError> {
+            let name = format!("{key}_{unit}{}", ["", "_per_s", "_per_s2"][derivative]);
+            let unit = format!("{unit}{}", ["", "/s", "/s2"][derivative]);
+            let given = document.number(&table, &name, range, &unit)?;
             Ok(given.unwrap_or(default))
         };
-        *motion = AxisMotion::within(or(0, motion.service, RANGES)?);
+        *motion = AxisMotion::within(or("service", 0, motion.service, RANGES)?);
+        let rms = (0.0, RATES.1);
+        motion.service_speed_rms = or("service_rms", 1, motion.service_speed_rms, rms)?;
+        motion.service_acceleration_rms =
+            or("service_rms", 2, motion.service_acceleration_rms, rms)?;
         // An axis may stand still in a run; the plan predicts what that costs.
-        motion.amplitude = or(1, motion.amplitude, (0.0, RANGES.1))?;
-        motion.speed = or(2, motion.speed, RATES)?;
-        motion.acceleration = or(3, motion.acceleration, RATES)?;
+        motion.amplitude = or("amplitude", 0, motion.amplitude, (0.0, RANGES.1))?;
+        motion.speed = or("speed", 1, motion.speed, RATES)?;
+        motion.acceleration = or("acceleration", 2, motion.acceleration, RATES)?;
     }
     Ok(motion)
 }
@@ -103,7 +116,8 @@ mod tests {
         let without = Stage::from_toml(SOUND, "stage.toml".as_ref()).expect("sound");
         assert_eq!(without.motion, Motion::default());
         let motion = parse(
-            "x = { service_m = 1e-3, acceleration_m_per_s2 = 0.5 }\nry = { amplitude_rad = 0.0 }\n",
+            "x = { service_m = 1e-3, acceleration_m_per_s2 = 0.5 }\n\
+             ry = { amplitude_rad = 0.0, service_rms_rad_per_s2 = 0.7 }\n",
         )
         .expect("sound");
         let default = Motion::default();
@@ -111,8 +125,12 @@ mod tests {
         let x = &motion.axes[0];
         assert_eq!((x.amplitude, x.acceleration), (1e-3, 0.5));
         assert!((x.speed - 2.0 * default.axes[0].speed).abs() < 1e-12);
+        assert!((x.service_speed_rms - 2.0 * default.axes[0].service_speed_rms).abs() < 1e-12);
         let ry = &motion.axes[5];
         assert_eq!((ry.service, ry.amplitude), (480e-6, 0.0));
+        let speed_rms = default.axes[5].service_speed_rms;
+        let rms = (ry.service_speed_rms, ry.service_acceleration_rms);
+        assert_eq!(rms, (speed_rms, 0.7));
     }
 
     #[test]
