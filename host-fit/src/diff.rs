@@ -11,9 +11,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::report::figure::{Group, bare, group, micro};
+use crate::report::figure::{Group, Item, bare, group, micro};
 use crate::report::parameters::{parameters_in, temperature_parameters_in};
+use crate::report::table::Table;
 use hallstage_input::axis::{AXES, Axis};
+use hallstage_solver::estimator::terms::names;
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::from_rows;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
@@ -34,14 +36,12 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
         all.extend(temperature_parameters_in(set));
         all
     });
-    let mut names: Vec<&String> = in_a.keys().collect();
-    names.extend(in_b.keys().filter(|name| !in_a.contains_key(*name)));
-    let change = |name: &String| {
-        let [a, b] = [&in_a, &in_b].map(|all| all.get(name));
+    let change = |name: String| {
+        let [a, b] = [&in_a, &in_b].map(|all| all.get(&name));
         let unit = a.or(b).map_or("", |parameter| parameter.unit);
         let [a, b] = [a, b].map(|parameter| parameter.map(|parameter| parameter.value));
         let change = a.zip(b).map(|(a, b)| b - a);
-        let errors = errors[0].get(name).zip(errors[1].get(name));
+        let errors = errors[0].get(&name).zip(errors[1].get(&name));
         let sigma = change
             .zip(errors)
             .map(|(change, (a, b))| change / a.hypot(*b));
@@ -49,9 +49,22 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
         let figures = group! {
             "a" => si(a), "b" => si(b), "change" => si(change), "sigma" => sigma, "unit" => json!(unit),
         };
-        (name.clone(), figures.into())
+        (name, figures.into())
     };
-    Group(names.into_iter().map(change).collect())
+    let names = names(usize::MAX).into_iter();
+    let names = names.filter(|name| in_a.contains_key(name) || in_b.contains_key(name));
+    Group(names.map(change).collect())
+}
+
+/// The [`parameter_changes`] as a table.
+pub fn change_table(changes: &Group) -> Table {
+    let mut table = Table::new("parameters", &["a", "b", "change", "sigma"]);
+    for (name, item) in &changes.0 {
+        if let Item::Group(group) = item {
+            table.row(name, group.flat().into_iter().map(|(_, figure)| figure));
+        }
+    }
+    table
 }
 
 /// The difference between the poses of two blobs, second less first, by the decoder of the target. The codes cover a grid of

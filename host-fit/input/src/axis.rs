@@ -49,9 +49,16 @@ pub const PLANAR: [Axis; 3] = [AXES[0], AXES[1], AXES[2]];
 /// Names of the Hall probes.
 pub const PROBES: [&str; 3] = ["A", "B", "C"];
 
-/// A unit as a sentence or a table shows it: `um` as µm.
+/// A number of things: "1 gap", "2 gaps".
+pub fn counted(count: usize, thing: &str) -> String {
+    let end = if count == 1 { "" } else { "s" };
+    format!("{count} {thing}{end}")
+}
+
+/// A unit as a sentence or a table shows it: `um` as µm, and a pure number without one.
 pub fn sign(unit: &str) -> &str {
     match unit {
+        "1" => "",
         "um" => "µm",
         "urad" => "µrad",
         "us" => "µs",

@@ -8,10 +8,12 @@ use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use hallstage_calibration::fit::counted;
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
 use hallstage_input::axis::{Axis, PLANAR};
+use hallstage_input::finding::{Code, Finding, Severity};
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -98,8 +100,17 @@ impl Evaluation {
         let comparable = judge.judgement(own_zeros).errors;
         let usual = if is_field(set) { 3.0 } else { 10.0 };
         let limit = order.limit.unwrap_or(usual);
+        let is_still = |found: &Finding| {
+            found.code() == Code::IdleMovement && found.severity == Severity::Refuse
+        };
+        let still = diagnosis.findings.iter().any(is_still);
+        let refusal = other_log(set, &comparable, limit);
+        let refusal = refusal.or_else(|| still.then_some(Refusal::Findings));
+        if refusal.is_some() {
+            diagnosis.verdict = Some(Verdict::Refused);
+        }
         Ok(Self {
-            refusal: other_log(set, &comparable, limit),
+            refusal,
             set: set.clone(),
             stage: stage.clone(),
             log,

@@ -10,6 +10,7 @@ use hallstage_calibration::diagnose::fit_checks::over_noise;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::diagnose::{Diagnosis, ERROR_TO_NOISE_MAX, diagnose_log};
 use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::log::LogReading;
@@ -129,6 +130,9 @@ impl FitOrder {
         }
         if let Ok(fit) = &mut outcome.fitted {
             fit.set.fit.forced = refusal.is_some();
+        }
+        if refusal.is_some() {
+            outcome.diagnosis.verdict = Some(Verdict::Refused);
         }
         outcome.refusal = refusal;
         Ok(outcome)

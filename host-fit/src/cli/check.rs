@@ -16,6 +16,9 @@ use std::time::Instant;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
+#[command(mut_arg("paths", |paths| paths.required(false).required_unless_present("stage")))]
+#[command(mut_arg("report", |report| report.requires("paths")))]
+#[command(mut_arg("json", |json| json.requires("paths")))]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     logs: Logs,
@@ -35,6 +38,9 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     )?;
     interrupt::watch();
     let stage = args.logs.stage.read()?;
+    if args.logs.paths.is_empty() {
+        return terminal::print("no fault found in the stage file\n");
+    }
     let log = args.logs.read(&stage, ReadOptions::FIT)?;
     let mut settings = FitSettings::new(ModelChoice::Auto);
     settings.options.watch = interrupt::watch();

@@ -4,7 +4,7 @@ use super::args::Json;
 use super::inspect::errors;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diff::{parameter_changes, pose_difference};
+use crate::diff::{change_table, parameter_changes, pose_difference};
 use crate::output::{blob_file, posterior_file};
 use crate::report::figure::{Group, group};
 use crate::report::text::as_text;
@@ -12,6 +12,7 @@ use clap::Args;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::terms::names;
 use runtime::{ModelKind, ParameterSet};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -39,15 +40,17 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     ];
     let difference = pose_difference(&a, &b);
     let is_compared = difference.is_some();
+    let changes = parameter_changes([&a, &b], [&errors[0], &errors[1]]);
     let figures = group! {
         "a" => blob(paths[0], &a),
         "b" => blob(paths[1], &b),
         "same_logs" => a.logs_sha256 == b.logs_sha256,
-        "parameters" => parameter_changes([&a, &b], [&errors[0], &errors[1]]),
+        "parameters" => json!(changes),
         "pose_difference" => difference,
     };
     args.json.write(&figures)?;
-    terminal::print(&as_text(&figures.tables()))?;
+    let tables = [figures.tables(), vec![change_table(&changes)]].concat();
+    terminal::print(&as_text(&tables))?;
     if a.serial != b.serial {
         let [a, b] = [&a, &b].map(|set| match set.serial.as_str() {
             "" => "none".to_owned(),

@@ -8,9 +8,10 @@ use crate::report::errors;
 use crate::report::figure::{Figure, Group, figure, group};
 use crate::report::parameters::{self, parameters_in};
 use crate::report::provenance::hex;
+use crate::report::table::Table;
 use crate::report::text::as_text;
 use clap::Args;
-use hallstage_input::axis::{AXES, Axis};
+use hallstage_input::axis::{AXES, Axis, PROBES};
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::posterior::temperature_errors;
 use runtime::matrix::to_rows;
@@ -42,7 +43,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     figures.set("repaired", json!(repaired));
     args.json.write(&figures)?;
     let parameters = parameters::tables(&parameters_in(&set), &[]);
-    let mut text = as_text(&[figures.tables(), parameters].concat());
+    let mut text = as_text(&[figures.tables(), matrices(&set), parameters].concat());
     if repaired.is_none() && set.model == ModelKind::Field {
         text += "\nfaults taken off: not known, its .posterior is not beside the blob\n";
     }
@@ -64,11 +65,41 @@ pub(super) fn errors(rms: [f32; 3], peak: [f32; 3]) -> Group {
     errors::from_rms_and_peak(rms.map(f64::from), peak.map(f64::from))
 }
 
-/// Rows of numbers.
-fn matrix(rows: &[[f32; 3]; 3]) -> Figure {
-    rows.iter()
-        .map(|row| row.iter().map(|x| f64::from(*x)).collect::<Figure>())
-        .collect()
+/// A matrix with the names and units of its rows and columns.
+fn matrix<const N: usize>(
+    title: &str,
+    names: [&str; 3],
+    columns: [&str; N],
+    rows: &[[f32; N]; 3],
+) -> Table {
+    let mut table = Table::new(title, &columns);
+    for (name, row) in names.into_iter().zip(rows) {
+        table.row(name, row.map(|x| f64::from(x).into()));
+    }
+    table
+}
+
+/// The matrices of a blob.
+fn matrices(set: &ParameterSet) -> Vec<Table> {
+    const PLANAR: [&str; 3] = ["X, m", "Y, m", "Rz, rad"];
+    const VERTICAL: [&str; 3] = ["Z, m", "Rx, rad", "Ry, rad"];
+    const GAPS: [&str; 3] = ["gap 1, m", "gap 2, m", "gap 3, m"];
+    const HALL: [&str; 3] = ["A, m", "B, m", "C, m"];
+    let (c, capacitive) = (&set.constants, &set.capacitive);
+    let vertical = to_rows(&capacitive.vertical_per_m);
+    #[rustfmt::skip]
+    let mut all = vec![
+        matrix("plane matrix", HALL, PLANAR, &to_rows(&set.plane)),
+        matrix("plane matrix inverse", PLANAR, HALL, &to_rows(&set.plane_inverse)),
+        matrix("capacitive plane matrix", VERTICAL, GAPS, &vertical),
+        matrix("planar per code", PLANAR, PROBES, &c.planar_per_code),
+        matrix("vertical per code", VERTICAL, ["gap 1", "gap 2", "gap 3"], &c.vertical_per_code),
+    ];
+    if c.temperature.is_used() {
+        let per_k = c.temperature.per_mk.map(|row| row.map(|x| x * 1e3));
+        all.push(matrix("temperature", PROBES, ["k, 1/K", "h, 1/K"], &per_k));
+    }
+    all
 }
 
 /// Two whole numbers of thousandths of a unit.
@@ -103,26 +134,22 @@ fn figures(set: &ParameterSet, errors_per_k: Option<Value>) -> Group {
             "errors" => errors(set.fit.rms, set.fit.peak),
         },
         "parameters" => json!(parameters_in(set)),
-        "plane_matrix" => matrix(&to_rows(&set.plane)),
-        "plane_matrix_inverse" => matrix(&to_rows(&set.plane_inverse)),
+        "plane_matrix" => json!(to_rows(&set.plane)),
+        "plane_matrix_inverse" => json!(to_rows(&set.plane_inverse)),
         "hall" => per_count(set.hall.m_per_code),
         "capacitive" => per_count(set.capacitive.m_per_code),
-        "capacitive_plane_matrix" => matrix(&to_rows(&set.capacitive.vertical_per_m)),
-        "planar_per_code" => matrix(&c.planar_per_code),
-        "vertical_per_code" => matrix(&c.vertical_per_code),
+        "capacitive_plane_matrix" => json!(to_rows(&set.capacitive.vertical_per_m)),
+        "planar_per_code" => json!(c.planar_per_code),
+        "vertical_per_code" => json!(c.vertical_per_code),
         "calibrated_range" => Group(AXES.iter().zip(ends).map(range).collect()),
         "sensitivity_min" => f64::from(c.sensitivity_min),
         "hall_codes" => window(&c.hall_window),
         "capacitive_codes" => window(&c.capacitive_window),
     };
     if c.temperature.is_used() {
-        let per_k = |row: &[f32; 2]| {
-            row.iter()
-                .map(|x| figure(f64::from(*x) * 1e3, "1/K"))
-                .collect::<Figure>()
-        };
+        let per_k = (c.temperature.per_mk).map(|row| row.map(|x| f64::from(x) * 1e3));
         let mut temperature = group! {
-            "k_h" => c.temperature.per_mk.iter().map(per_k).collect::<Figure>(),
+            "k_h_per_k" => json!(per_k),
             "t0" => thousandths(c.temperature.zero_mc, "degC"),
             "reach" => thousandths(c.temperature.reach_mk, "K"),
         };

@@ -190,8 +190,8 @@ fn run(cli: &Cli) -> u8 {
 
 /// Prints which files were written.
 fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
-    let line = |path: PathBuf| terminal::print(&format!("wrote {}\n", path.display()));
-    paths.into_iter().try_for_each(line)
+    let mut files = (paths.into_iter()).filter(|path| !is_standard_output(path));
+    files.try_for_each(|path| terminal::print(&format!("wrote {}\n", path.display())))
 }
 
 /// Refuses outputs that are an input, the posterior beside one, or one another, and outputs that cannot be written: before the work. Where one

@@ -178,7 +178,7 @@ impl Group {
     }
 
     /// Its figures and the figures of the groups in it, these with the name of their group before their own.
-    pub(super) fn flat(&self) -> Vec<(String, Figure)> {
+    pub(crate) fn flat(&self) -> Vec<(String, Figure)> {
         let one = |(name, item): &(String, Item)| match item {
             Item::Figure(figure) => vec![(words(name), figure.readable(false))],
             Item::Group(group) => {

@@ -81,8 +81,8 @@ fn warm_log(log: &WarmLog) -> Group {
         "body" => figure(log.warmer_k[1], "K"),
         "error_of_k" => figure(k, "1/K"),
         "error_of_h" => figure(h, "1/K"),
-        "ratio_at_5_k" => at(0),
-        "ratio_at_10_k" => at(1),
+        "ratio_at_5_kelvin" => at(0),
+        "ratio_at_10_kelvin" => at(1),
     }
 }
 
@@ -138,7 +138,7 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
             micro(peaks[1]),
             micro(limits.acceleration),
         ];
-        motion.row(axis.key, figures);
+        motion.row(axis.name, figures);
     }
     let standard_errors = plan.forecast.posterior.standard_errors();
     let index = |parameter: &str| (0..COUNT).find(|k| name(*k) == parameter);

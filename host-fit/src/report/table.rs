@@ -202,17 +202,6 @@ impl Group {
             let inner = format!("{title} {name}").trim().to_owned();
             match item {
                 Item::Hidden(_) | Item::Figure(Figure::None) => {}
-                Item::Figure(Figure::List(matrix))
-                    if matches!(matrix[..], [Figure::List(_), ..]) =>
-                {
-                    let row = |row: &Figure| (row.readable(false).text(), Vec::new());
-                    let rows = matrix.iter().map(row).collect();
-                    others.push(Table {
-                        title: inner,
-                        rows,
-                        ..Table::default()
-                    });
-                }
                 Item::Figure(figure) => plain.row(name, [figure.readable(true)]),
                 Item::Group(group) if title.is_empty() || has_figures || group.has_groups() => {
                     group.add_tables(&inner, &mut others);
@@ -260,11 +249,11 @@ mod tests {
             "",
             "errors",
             "       rmse    peak  unit",
-            "  x   1.000  20.500  µm",
-            "  rz  0.250   0.500  µrad",
+            "  X   1.000  20.500  µm",
+            "  Rz  0.250   0.500  µrad",
             "",
             "logs",
-            "  path   errors x rmse, µm  errors rz rmse, µrad",
+            "  path   errors X rmse, µm  errors Rz rmse, µrad",
             "  a.csv              2.000                 3.000",
             "",
         ];

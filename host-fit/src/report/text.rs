@@ -2,7 +2,7 @@
 
 use super::figure::Figure;
 use super::table::Table;
-use hallstage_input::axis::sign;
+use hallstage_input::axis::{AXES, sign};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -100,9 +100,10 @@ pub fn as_text(tables: &[Table]) -> String {
     out
 }
 
-/// A key as words.
+/// A key as words, and the key of an axis as its name.
 pub(super) fn words(key: &str) -> String {
-    key.replace('_', " ")
+    let axis = AXES.iter().find(|axis| axis.key == key);
+    axis.map_or_else(|| key.replace('_', " "), |axis| axis.name.to_owned())
 }
 
 /// Text with escaped control characters, except the characters of `kept`. Characters that reorder their neighbours are

@@ -58,6 +58,9 @@ pub struct Summary {
     pub axes: Table,
     /// What to do next; empty if nothing.
     pub next: String,
+    /// Whether that is the remedy of a finding, whose message ends with it.
+    #[serde(skip)]
+    is_remedy: bool,
 }
 
 impl Summary {
@@ -65,6 +68,7 @@ impl Summary {
     pub fn new(of: &Subject) -> Self {
         let predicted = of.diagnosis.predicted.as_ref();
         let verdict = of.diagnosis.verdict;
+        let remedy = remedy(of, verdict);
         let (mark, word) = match (of.end, verdict) {
             (End::Failed(_), _) => ("refused", "Refused"),
             (End::Interrupted, _) => ("limited", "Interrupted, the best so far"),
@@ -81,7 +85,8 @@ impl Summary {
             word,
             sentence: sentence(of),
             axes: axes(of, predicted),
-            next: next(of, verdict),
+            is_remedy: remedy.is_some(),
+            next: remedy.unwrap_or_else(|| next(of, verdict).to_owned()),
         }
     }
 
@@ -92,8 +97,9 @@ impl Summary {
             "Refused" => String::new(),
             _ => format!(": {}", self.sentence),
         };
+        // A remedy stands in the message of its finding.
         let next = match self.next.as_str() {
-            "" => String::new(),
+            next if self.is_remedy || next.is_empty() => String::new(),
             next => format!("next: {next}\n"),
         };
         let axes = match self.axes.rows.is_empty() {
@@ -152,28 +158,29 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
     table
 }
 
-/// What to do next.
-fn next(of: &Subject, verdict: Option<Verdict>) -> String {
-    let findings = &of.diagnosis.findings;
-    let remedy = |least: Severity| {
-        let worst = findings.iter().find(|found| found.severity >= least);
-        worst.map(|found| found.code().entry().remedy.to_owned())
+/// The remedy of the worst finding, where it stands in the way.
+fn remedy(of: &Subject, verdict: Option<Verdict>) -> Option<String> {
+    let least = match (of.end, verdict) {
+        (End::Failed(_), _) | (_, Some(Verdict::Refused)) => Severity::Refuse,
+        (_, Some(Verdict::Limited)) if of.is_field => Severity::Warn,
+        _ => return None,
     };
-    let usual = match of.end {
-        End::Written => "judge it on another log with host-fit eval",
-        End::Checked => "host-fit fit",
-        End::Judged if verdict == Some(Verdict::Refused) => "host-fit recalibrate, or a new fit",
-        _ => "",
-    };
+    let worst = (of.diagnosis.findings.iter()).find(|found| found.severity >= least);
+    worst.map(|found| found.code().entry().remedy.to_owned())
+}
+
+/// What to do next where no finding stands in the way.
+fn next(of: &Subject, verdict: Option<Verdict>) -> &'static str {
     match (of.end, verdict) {
-        (End::Failed(_), _) | (_, Some(Verdict::Refused)) => remedy(Severity::Refuse),
-        (_, Some(Verdict::Limited)) if of.is_field => remedy(Severity::Warn),
-        (_, Some(Verdict::Limited)) => {
-            Some("for service record all six axes moving at once: host-fit plan".to_owned())
+        (End::Failed(_), _) => "",
+        (_, Some(Verdict::Limited)) if !of.is_field => {
+            "for service record all six axes moving at once: host-fit plan"
         }
-        _ => None,
+        (End::Written, _) => "judge it on another log with host-fit eval",
+        (End::Checked, _) => "host-fit fit",
+        (End::Judged, Some(Verdict::Refused)) => "host-fit recalibrate, or a new fit",
+        _ => "",
     }
-    .unwrap_or_else(|| usual.to_owned())
 }
 
 #[cfg(test)]

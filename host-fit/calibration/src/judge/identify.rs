@@ -1,6 +1,7 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
 use crate::judge::statistics::PoseError;
+use hallstage_input::axis::sign;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
@@ -43,7 +44,7 @@ pub enum FitFailure {
     #[error(
         "{} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
          cannot be found: record {}{}",
-        motion.axis(), motion.recording(), without(*motion), unit = motion.micro_unit()
+        motion.axis(), motion.recording(), without(*motion), unit = sign(motion.micro_unit())
     )]
     NoMotion {
         /// The motion that is missing.
@@ -57,7 +58,7 @@ pub enum FitFailure {
     },
     /// A Hall probe reads nothing but noise while the stage moves.
     #[error(
-        "Hall probe {probe} does not follow the motion in the log (span {span_micro:.3} um, noise {noise_micro:.3} um): \
+        "Hall probe {probe} does not follow the motion in the log (span {span_micro:.3} µm, noise {noise_micro:.3} µm): \
          check the probe, its cable and its column"
     )]
     DeadProbe {
@@ -81,7 +82,7 @@ pub enum FitFailure {
         "the fitted model ({model}) does not describe this log: its errors are {error_micro:.1} {unit} rms in {axis}, \
          the motion itself has {motion_micro:.1} {unit} rms. Check the columns, the order and signs of the sensors \
          and the scales in stage.toml, and record a log where the stage moves along {axis}",
-        axis = motion.axis(), unit = motion.micro_unit()
+        axis = motion.axis(), unit = sign(motion.micro_unit())
     )]
     NotDescribed {
         /// Name of the model.

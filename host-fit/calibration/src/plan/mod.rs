@@ -59,7 +59,7 @@ pub enum PlanError {
     #[error(
         "a run of {seconds} s cannot move {axis} by {:.1} {} to both sides within the limits of its speed and \
          acceleration; make the run longer, or change amplitude or limits in [motion] of stage.toml",
-        amplitude * 1e6, if axis.starts_with('r') { "urad" } else { "um" }
+        amplitude * 1e6, if axis.starts_with('r') { "µrad" } else { "µm" }
     )]
     TooFast {
         /// Its key in `[motion]`.

@@ -1,7 +1,7 @@
 //! The evidence of a finding: what happened, and how large it is.
 
 use super::causes::mistake;
-use hallstage_input::axis::sign;
+use hallstage_input::axis::{counted, sign};
 use hallstage_input::finding::{Finding, Kind, Place, Quantity, TimeCourse};
 
 /// Names in a list at most.
@@ -25,10 +25,10 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::FileCut { .. } => "the last line has no line break, so its last number may be cut".to_owned(),
         Kind::MovementsByTime { movements, gap_rows, .. } => {
-            format!("there is no column for the movement. The times separate {movements} movements: one begins after a gap of more than {gap_rows} rows and where the time starts again")
+            format!("there is no column for the movement. The times separate {}: one begins after a gap of more than {gap_rows} rows and where the time starts again", counted(*movements, "movement"))
         }
         Kind::BetweenCodes { mean_codes, .. } => format!("voltages are {mean_codes:.2} codes from whole codes on average"),
-        Kind::Excerpt { rows, taken, runs } => format!("the fit and the diagnosis use {taken} of {rows} rows, in {runs} runs"),
+        Kind::Excerpt { rows, taken, runs } => format!("the fit and the diagnosis use {taken} of {rows} rows, in {}", counted(*runs, "run")),
         Kind::RowsSkipped { reason, rows, line, column, name, .. } => {
             format!("rows skipped because of {reason}: {rows} (the first: line {line}, column {column}, {name})")
         }
@@ -36,16 +36,16 @@ pub(super) fn evidence(found: &Finding) -> String {
             let names: Vec<String> = movements.iter().map(i64::to_string).collect();
             format!("all rows of movement {} are bad ({rows})", listed(&names))
         }
-        Kind::RowsMissing { rows, percent, gaps } => format!("{rows} rows are missing ({percent:.2} %), in {gaps} gaps"),
+        Kind::RowsMissing { rows, percent, gaps } => format!("{} missing ({percent:.2} %), in {}", counted(*rows as usize, "row"), counted(*gaps, "gap")),
         Kind::UnevenTimes { rms_us } => format!("rows come at uneven times, {rms_us:.0} µs rms off an even rate"),
         Kind::OtherRate { period_us, servo_us, periods } => {
             let thinned = periods.map_or(String::new(), |periods| format!("the log is thinned to one of {periods} servo periods: "));
             format!("{thinned}rows are {period_us:.1} µs apart, the servo period in stage.toml is {servo_us:.1} µs")
         }
-        Kind::IdleMovements { movements, of } => format!("nothing moves in {movements} of {of} movements, so they add nothing to the fit"),
+        Kind::IdleMovements { movements, of } => format!("nothing moves in {movements} of {}, and rows without motion show nothing", counted(*of, "movement")),
         Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => format!("{on} never changes"),
         Kind::Stands { rows, percent, longest_s } | Kind::StandsAtEnd { rows, percent, longest_s } => {
-            format!("{on} stands still in {rows} rows ({percent:.1} % of the log), for up to {longest_s:.3} s at a time")
+            format!("{on} stands still in {} ({percent:.1} % of the log), for up to {longest_s:.3} s at a time", counted(*rows, "row"))
         }
         Kind::OutlierRows { rows, largest_um } => {
             let rows = format!("{rows} {}", if *rows == 1 { "row is" } else { "rows are" });
@@ -95,9 +95,9 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("the fitted model ({model}) does not describe the log: its errors are {error_micro:.1} {unit} rms in {on}, the motion itself has {motion_micro:.1} {unit} rms")
         }
         Kind::ZerosClipped { movements, of, largest_um } => {
-            format!("the zero deviation of {movements} of {of} movements is beyond its range (largest {largest_um:.1} µm)")
+            format!("the zero deviation of {movements} of {} is beyond its range (largest {largest_um:.1} µm)", counted(*of, "movement"))
         }
-        Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {rows} rows, so they are not part of the errors"),
+        Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {}, which the errors leave out", counted(*rows, "row")),
         Kind::LateReference { lag_us, periods } => {
             let (lag_us, periods, way) = (lag_us.abs(), periods.abs(), way(*lag_us));
             format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account")
@@ -107,7 +107,7 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::VerticalAtLimit { parameters } => format!("{parameters} of the vertical terms stand at an end of their ranges"),
         Kind::MovementsMissed { movements } => {
-            format!("the draw has no row of {} movement(s) ({}), so their zero deviations are not fitted, and zero is taken", movements.len(), listed(movements))
+            format!("the draw has no row of {} ({}), so their zero deviations are not fitted, and zero is taken", counted(movements.len(), "movement"), listed(movements))
         }
         Kind::WildRow { micro, unit, ratio } => format!("the largest error, {micro:.1} {} in {on}, is {ratio:.0} times the rms", sign(unit)),
         Kind::OtherMotion { micro, service_micro, unit, .. } => {

@@ -128,6 +128,6 @@ mod tests {
             "Capacitive sensor 2 never changes. Is it connected?"
         );
         let refused = Finding::new(Kind::CodesRefused { rows: 3 });
-        assert!(message(&refused).ends_with("not part of the errors."));
+        assert!(message(&refused).ends_with("the errors leave out."));
     }
 }

@@ -1,6 +1,7 @@
 //! One cell of a log as a number, or what is wrong with it.
 
 use super::decimal;
+use crate::axis::sign;
 use crate::stage::CodeScale;
 
 /// A fault of one cell.
@@ -55,7 +56,8 @@ pub enum CellFault {
     },
     /// Beyond every sensible magnitude.
     #[error(
-        "{value:e} {unit} is absurd (more than {limit:e} {unit}); remove the row, or check the column's unit in the [log] table of stage.toml"
+        "{value:e}{0} is absurd (more than {limit:e}{0}); remove the row, or check the column's unit in the [log] table of stage.toml",
+        spaced(unit)
     )]
     Absurd {
         /// The value, in `unit`.
@@ -101,6 +103,11 @@ impl CellFault {
             Self::Saturated { .. } => "a saturated code",
         }
     }
+}
+
+/// A unit after its number.
+fn spaced(unit: &str) -> String {
+    format!(" {}", sign(unit)).trim_end().to_owned()
 }
 
 fn comma_hint(text: &str) -> &'static str {

@@ -11,7 +11,7 @@ use std::ops::Range;
 /// Motion below this is none, m: it is a few times the drift of the interferometers in a movement.
 const STILL_M: f64 = 2e-6;
 
-/// Movements without motion. Their rows are left out.
+/// Movements without motion. Their rows are left out. A log where nothing moves at all proves nothing and is refused.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let is_idle = |rows: &&Range<usize>| {
         // In short pieces, because the interferometers of a stage at rest drift.
@@ -28,8 +28,13 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
         movements: idle.len(),
         of: log.segments.len(),
     };
+    let moves = idle.len() < log.segments.len();
     log.leave_out(idle, 0);
-    Some(log.found_at(first, kind))
+    let found = log.found_at(first, kind);
+    Some(match moves {
+        true => found,
+        false => found.with_severity(Severity::Refuse),
+    })
 }
 
 /// Channels that repeat a value for longer than noise does.

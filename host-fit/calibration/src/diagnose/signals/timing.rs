@@ -15,6 +15,9 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
     };
     let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
     let steps: Vec<(usize, f64, f64)> = rows.map(step).collect();
+    if steps.is_empty() {
+        return Vec::new();
+    }
     let sum = |of: &dyn Fn(f64, f64) -> f64| steps.iter().map(|&(_, k, us)| of(k, us)).sum::<f64>();
     let period_us = sum(&|_, us| us) / sum(&|k, _| k).max(1.0);
     // A step has the errors of two times.

@@ -26,7 +26,7 @@ fn what_is_wrong_is_named_with_its_place_and_a_remedy() {
         (",161,", ",99999999999,", x, "absurd (more than 8"),
         (",161,", ",-1e30,", x, "m is absurd"),
         (",161,", ",8200000,", x, "m is absurd"),
-        ("0,2000,161", "0,1e17,161", "3: column 2 (t_us), movement 0: ", "us is absurd"),
+        ("0,2000,161", "0,1e17,161", "3: column 2 (t_us), movement 0: ", "µs is absurd"),
         ("\n4,2000", "\n1e300,2000", "6: column 1 (movement): ", "absurd"),
         (",97,", ",97.5,", a, "97.5 is not a whole number"),
         (",764,", ",32768,", cap, "code 32768 is outside the converter's range -32768 to 32767"),
