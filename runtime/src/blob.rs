@@ -3,7 +3,7 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 4 | magic, `HALL` in ASCII |
-//! | 4 | 2 | layout version, little-endian: 1, 2 for the field model, or 3 with temperatures |
+//! | 4 | 2 | layout version, little-endian: 1, 2 for the field model, 3 with temperatures, or 4 with a motion correction |
 //! | 6 | 1 | 1 if the fit was refused and written all the same, else 0 |
 //! | 7 | 1 | reserved: 0 |
 //! | 8 | 4 | payload length n in bytes, little-endian |
@@ -21,16 +21,19 @@
 //! follow the counts of rows, (k, h) of the probes follow the other numbers. With the field model
 //! the geometry is left out, too.
 //!
+//! Version 4 is version 3 with a [`MotionCorrection`](crate::MotionCorrection) as the last numbers: the
+//! rows of A, then of L. Without temperatures T0 and reach are 0, and (k, h) are left out.
+//!
 //! theta of the probes is the angle of the sensing axis from +Y for A and B and from +X for C (see
 //! [`geometry`](crate::geometry)), whatever direction the stage was designed with: in the
 //! paper's directions it is the misalignment, and for a probe mounted the other way round it is
 //! near pi. So a stage with other directions needs nothing else in the blob.
 //!
 //! The CRC finds any five flipped bits, any odd number of them, and any burst of up to 32, in
-//! every blob: with up to [`MAX_BYTES`] at most 5,216 bits stand before the check, and up to 5,243
+//! every blob of versions 1 to 3: at most 5,216 bits stand before the check, and up to 5,243
 //! its Hamming distance is 6 (P. Koopman, 32-bit CRC zoo, polynomial 0x8f6e37a0; by our own
-//! search, the first four bits that are missed span 5,276). Beyond, and so at 1,024 bytes, it
-//! is 4: any three bits, any odd number and the bursts.
+//! search, the first four bits that are missed span 5,276). Beyond, as with the 5,792 bits of the largest
+//! blob of version 4, it is 4: any three bits, any odd number and the bursts.
 //!
 //! In a file the length is exact; in flash the header gives the length and the rest is padding. A
 //! layout that cannot be read by this version gets a new version number, and this version's
@@ -44,15 +47,17 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 
 /// First bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"HALL";
-/// The newest layout that this version reads, with temperatures. See
+/// The newest layout that this version reads, with a motion correction. See
 /// [`ParameterSet::layout_version`].
-pub const LAYOUT_VERSION: u16 = 3;
+pub const LAYOUT_VERSION: u16 = 4;
+/// The first layout with temperatures.
+pub(crate) const WITH_TEMPERATURE: u16 = 3;
 /// Bytes before the payload.
 pub const HEADER_BYTES: usize = 12;
 /// Bytes of the check after the payload.
 pub const CRC_BYTES: usize = 4;
-/// The largest blob. Up to this length CRC-32C finds any five flipped bits.
-pub const MAX_BYTES: usize = 656;
+/// The largest blob. Of versions 1 to 3 it is 656.
+pub const MAX_BYTES: usize = 728;
 
 /// CRC-32C without a table: a blob is read once, at start, and flash is short.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
@@ -147,11 +152,12 @@ impl BlobError {
 }
 
 impl ParameterSet {
-    /// The version of the layout that this set is written in: 3 with temperatures, else 2 with the field
-    /// model, else 1.
+    /// The version of the layout that this set is written in: 4 with a motion correction, else 3 with
+    /// temperatures, else 2 with the field model, else 1.
     pub const fn layout_version(&self) -> u16 {
         match self.probes {
-            _ if self.constants.temperature.is_used() => LAYOUT_VERSION,
+            _ if self.motion_correction.is_some() => LAYOUT_VERSION,
+            _ if self.constants.temperature.is_used() => WITH_TEMPERATURE,
             Probes::Linear(_) => 1,
             Probes::Field(_) => 2,
         }
@@ -185,7 +191,7 @@ impl ParameterSet {
     /// # Errors
     /// Every variant of [`BlobError`] except `BufferTooSmall` and `OtherStage`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, BlobError> {
-        let length = blob_length(bytes)?;
+        let (_, length) = version_and_length(bytes)?;
         if bytes.len() > length {
             return Err(BlobError::TrailingBytes {
                 blob_bytes: length,
@@ -201,7 +207,7 @@ impl ParameterSet {
     /// # Errors
     /// As [`ParameterSet::from_bytes`], except `TrailingBytes`.
     pub fn from_flash(memory: &[u8]) -> Result<Self, BlobError> {
-        let length = blob_length(memory)?;
+        let (version, length) = version_and_length(memory)?;
         let blob = memory.get(..length).ok_or(BlobError::Truncated {
             needed: length,
             found: memory.len(),
@@ -216,12 +222,11 @@ impl ParameterSet {
         }
         let (header, payload) =
             (body.split_at_checked(HEADER_BYTES)).ok_or(BlobError::BadPayload)?;
-        // Changed where it was read: a copy on the stack of a controller is 700 bytes.
-        let version = header.get(4..6).ok_or(BlobError::BadPayload)?;
-        let mut read = layout::read(payload, version == LAYOUT_VERSION.to_le_bytes());
+        // Changed where it was read: a copy on the stack of a controller is 780 bytes.
+        let mut read = layout::read(payload, version);
         let set = read.as_mut().ok_or(BlobError::BadPayload)?;
         // Each version holds its own models.
-        if version != set.layout_version().to_le_bytes() {
+        if version != set.layout_version() {
             return Err(BlobError::BadPayload);
         }
         set.fit.forced = header.get(6) == Some(&1);
@@ -243,8 +248,8 @@ impl ParameterSet {
     }
 }
 
-/// The whole length of the blob that starts `bytes`, by its header.
-fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
+/// The layout and the whole length of the blob that starts `bytes`, by its header.
+fn version_and_length(bytes: &[u8]) -> Result<(u16, usize), BlobError> {
     let header = bytes
         .first_chunk::<HEADER_BYTES>()
         .ok_or(BlobError::Truncated {
@@ -259,22 +264,18 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     if found != MAGIC {
         return Err(BlobError::BadMagic { found });
     }
-    // A further layout is one more arm here; what differs in its payload follows from the
-    // model's tag, in `layout`.
-    let largest = match u16::from_le_bytes([v0, v1]) {
-        1..=LAYOUT_VERSION => MAX_BYTES,
-        found => {
-            return Err(BlobError::UnknownVersion {
-                found,
-                supported: LAYOUT_VERSION,
-            });
-        }
-    };
+    let version = u16::from_le_bytes([v0, v1]);
+    if !(1..=LAYOUT_VERSION).contains(&version) {
+        return Err(BlobError::UnknownVersion {
+            found: version,
+            supported: LAYOUT_VERSION,
+        });
+    }
     let payload_bytes = u32::from_le_bytes([n0, n1, n2, n3]);
-    let most = largest - HEADER_BYTES - CRC_BYTES;
+    let most = MAX_BYTES - HEADER_BYTES - CRC_BYTES;
     match usize::try_from(payload_bytes) {
         Ok(payload) if payload <= most && forced <= 1 && reserved == 0 => {
-            Ok(HEADER_BYTES + payload + CRC_BYTES)
+            Ok((version, HEADER_BYTES + payload + CRC_BYTES))
         }
         _ => Err(BlobError::BadHeader { payload_bytes }),
     }

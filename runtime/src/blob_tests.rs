@@ -7,14 +7,15 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 
 /// The blobs of [`samples`], by version of their layout.
-const GOLDEN: [&[u8]; 3] = [
+const GOLDEN: [&[u8]; 4] = [
     include_bytes!("../examples/stage.bin"),
     include_bytes!("../examples/field.bin"),
     include_bytes!("../examples/warm.bin"),
+    include_bytes!("../examples/motion.bin"),
 ];
 
 /// The golden example of each version, and its length.
-fn goldens() -> [([u8; MAX_BYTES], usize); 3] {
+fn goldens() -> [([u8; MAX_BYTES], usize); 4] {
     GOLDEN.map(|golden| {
         let mut bytes = [0; MAX_BYTES];
         bytes[..golden.len()].copy_from_slice(golden);
@@ -23,11 +24,12 @@ fn goldens() -> [([u8; MAX_BYTES], usize); 3] {
 }
 
 /// The sets that [`goldens`] were made of.
-fn samples() -> [ParameterSet; 3] {
+fn samples() -> [ParameterSet; 4] {
     [
         sample::parameters(),
         sample::field_parameters(),
         sample::warm_parameters(),
+        sample::with_motion(sample::warm_calibration()),
     ]
 }
 
@@ -81,17 +83,20 @@ fn the_layout_is_as_documented() {
     // The field model is the fifth kind.
     assert_eq!(&GOLDEN[1][12..21], b"\x04\x07HS-0007");
     assert_eq!(&GOLDEN[2][..8], b"HALL\x03\x00\x00\x00");
-    // Beyond, the CRC misses four flipped bits somewhere.
-    const { assert!(8 * (MAX_BYTES - CRC_BYTES) <= 5243) }
+    assert_eq!(&GOLDEN[3][..8], b"HALL\x04\x00\x00\x00");
+    // A and L are 18 numbers. Beyond, the CRC misses four flipped bits somewhere.
+    const { assert!(8 * (MAX_BYTES - 4 * 18 - CRC_BYTES) <= 5243) }
 }
 
 #[test]
 fn a_model_in_the_layout_of_another_is_refused() {
-    for (version, (mut blob, n)) in [2u16, 3, 1].into_iter().zip(goldens()) {
-        blob[4..6].copy_from_slice(&version.to_le_bytes());
-        seal(&mut blob, n - CRC_BYTES);
-        let refused = ParameterSet::from_bytes(&blob[..n]);
-        assert_eq!(refused, Err(BlobError::BadPayload));
+    for (own, (mut blob, n)) in (1u16..).zip(goldens()) {
+        for version in (1..=LAYOUT_VERSION).filter(|version| *version != own) {
+            blob[4..6].copy_from_slice(&version.to_le_bytes());
+            seal(&mut blob, n - CRC_BYTES);
+            let refused = ParameterSet::from_bytes(&blob[..n]);
+            assert_eq!(refused, Err(BlobError::BadPayload), "{own} as {version}");
+        }
     }
 }
 
@@ -117,6 +122,24 @@ fn the_largest_set_fits_the_largest_blob() {
     }
 }
 
+/// The same numbers follow each model, with temperatures and without, and the decoder stays the same.
+#[test]
+fn a_motion_correction_goes_with_every_model_and_changes_no_other_number() {
+    for calibration in [
+        sample::calibration(),
+        sample::field_calibration(),
+        sample::warm_calibration(),
+    ] {
+        let without = calibration.prepare(&sample::origin()).expect("sound");
+        let set = sample::with_motion(calibration);
+        let (blob, n) = blob_of(&set);
+        let read = ParameterSet::from_bytes(&blob[..n]).expect("sound");
+        assert_eq!(read, set);
+        assert_eq!(read.motion_correction, Some(sample::MOTION));
+        assert_eq!(read.decoder(), without.decoder());
+    }
+}
+
 #[test]
 fn every_flipped_bit_is_refused() {
     for (mut blob, n) in goldens() {
@@ -132,7 +155,7 @@ fn every_flipped_bit_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(9_000))]
     #[test]
-    fn up_to_five_flipped_bits_are_refused(which in 0..3usize, bits in prop::collection::vec(any::<Index>(), 2..=5)) {
+    fn up_to_five_flipped_bits_are_refused(which in 0..4usize, bits in prop::collection::vec(any::<Index>(), 2..=5)) {
         let (golden, n) = goldens()[which];
         let mut blob = golden;
         for bit in bits.into_iter().map(|bit| bit.index(8 * n)) {

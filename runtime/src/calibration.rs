@@ -7,6 +7,7 @@ use crate::geometry::ProbeGeometry;
 use crate::layout;
 use crate::matrix::{inverse, to_rows};
 use crate::model::{ModelKind, Probes};
+use crate::motion::MotionCorrection;
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
@@ -42,6 +43,7 @@ use nalgebra::Matrix3;
 ///     calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
 ///     sensitivity_min: Calibration::SENSITIVITY_MIN,
 ///     temperature: runtime::Temperature::NONE,
+///     motion_correction: None,
 /// };
 /// let set = calibration.prepare(&Origin::default())?;
 /// assert_eq!(set.check(), Ok(()));
@@ -79,6 +81,8 @@ pub struct Calibration {
     pub sensitivity_min: f64,
     /// How the sensitivities follow temperature.
     pub temperature: Temperature<f64>,
+    /// Corrects poses by commanded velocity and acceleration, if the log has shown such errors.
+    pub motion_correction: Option<MotionCorrection>,
 }
 
 /// Where a parameter set comes from: text and figures for [`Calibration::prepare`].
@@ -164,6 +168,7 @@ impl Calibration {
             },
             probes: self.probes.rounded(),
             constants: self.constants()?.rounded(),
+            motion_correction: self.motion_correction,
         };
         layout::restore(&mut set);
         set.check()?;

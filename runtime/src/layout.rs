@@ -8,14 +8,16 @@
 //!
 //! Of the field model's sets three matrices are left out, which follow from the constants of
 //! the tick: [`restore`] puts them back. So the largest blob stays within the length up to
-//! which its CRC finds any five flipped bits. With temperature coefficients as well, the geometry is
-//! left out, too.
+//! which its CRC finds any five flipped bits. With temperature coefficients or a motion correction as
+//! well, the geometry is left out, too.
 
+use crate::blob::{LAYOUT_VERSION, WITH_TEMPERATURE};
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
 use crate::geometry::{ProbeGeometry, SensingAxes};
 use crate::matrix::{from_rows, inverse_and_determinant, to_rows};
 use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
+use crate::motion::MotionCorrection;
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
@@ -35,8 +37,7 @@ struct Head {
 /// What stands between the hash and the numbers: how many rows there are and were fitted.
 type Rows = (u32, u32);
 
-/// What stands next with temperature coefficients: T0 in m degC and the reach in mK, of mount and
-/// body.
+/// What stands next from version 3 on: T0 in m degC and the reach in mK, of mount and body.
 type Zero = ([i32; 2], [u32; 2]);
 
 /// What stands after the numbers: the windows of the Hall and of the capacitive codes.
@@ -60,6 +61,7 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         capacitive,
         probes,
         constants,
+        motion_correction,
     } = set;
     let FitRecord {
         rows: _,
@@ -76,7 +78,7 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     } = geometry;
     let matrices = matches!(probes, Probes::Linear(_));
     let with_temperature = constants.temperature.is_used();
-    if matrices || !with_temperature {
+    if matrices || !(with_temperature || motion_correction.is_some()) {
         visit("the probe geometry", lever_arm_m);
         visit("the probe geometry", misalignment_rad);
     }
@@ -131,6 +133,15 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
             "the temperature coefficients",
             temperature.per_mk.as_flattened_mut(),
         );
+    }
+    if let Some(MotionCorrection {
+        acceleration_s2,
+        velocity_s,
+    }) = motion_correction
+    {
+        for matrix in [acceleration_s2, velocity_s] {
+            visit("the motion correction", matrix.as_flattened_mut());
+        }
     }
 }
 
@@ -201,7 +212,7 @@ pub(crate) fn restore(set: &mut ParameterSet) {
         set.plane_inverse = from_rows(&c.planar_per_code) / set.hall.m_per_code;
         set.plane = inverse_and_determinant(&set.plane_inverse).0;
         set.capacitive.vertical_per_m = from_rows(&c.vertical_per_code) / set.capacitive.m_per_code;
-        if c.temperature.is_used() {
+        if c.temperature.is_used() || set.motion_correction.is_some() {
             let (axes, arms) = SensingAxes::from_plane(&set.plane);
             set.geometry.lever_arm_m = arms;
             set.geometry.misalignment_rad = axes.misalignment_rad();
@@ -225,7 +236,7 @@ pub(crate) fn write(set: &ParameterSet, room: &mut [u8]) -> Option<usize> {
     }
     out.put(&rows)?;
     let temperature = &set.constants.temperature;
-    if temperature.is_used() {
+    if set.layout_version() >= WITH_TEMPERATURE {
         let zero: Zero = (temperature.zero_mc, temperature.reach_mk);
         out.put(&zero)?;
     }
@@ -257,7 +268,7 @@ impl Out<'_> {
 /// Reads a payload, which must end where the set does; `None` if it is none. As a function of
 /// its own it frees its stack before the checks.
 #[inline(never)]
-pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSet> {
+pub(crate) fn read(payload: &[u8], version: u16) -> Option<ParameterSet> {
     let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
     let (&logs_sha256, rest) = rest.split_first_chunk()?;
     let ((rows, train_rows), mut rest) = postcard::take_from_bytes::<Rows>(rest).ok()?;
@@ -284,9 +295,10 @@ pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSe
             ModelKind::Field => Probes::Field([FieldProbe::default(); 3]),
         },
         constants: DecoderConstants::default(),
+        motion_correction: (version == LAYOUT_VERSION).then(MotionCorrection::default),
     };
     let temperature = &mut set.constants.temperature;
-    if with_temperature {
+    if version >= WITH_TEMPERATURE {
         let zero: Zero;
         (zero, rest) = postcard::take_from_bytes(rest).ok()?;
         (temperature.zero_mc, temperature.reach_mk) = zero;

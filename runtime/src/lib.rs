@@ -26,6 +26,7 @@
 //! | [`tracker`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
 //! | [`zero_offset`] | the zero deviation measured at rest |
 //! | [`prediction`] | the pose at a time after its sample |
+//! | [`motion`] | errors that follow the commanded velocity and acceleration |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
 //! | [`real`] | the operations that a number must have to run a model |
@@ -43,6 +44,7 @@
 //! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
 //! | delta_A, delta_B, delta_C | zero deviation | m |
 //! | (beyond the paper) k, h, G | [`temperature`] | 1/mK, 1/mK, 1 |
+//! | (beyond the paper) A, L | [`motion`], `acceleration_s2`, `velocity_s` | rows of m, m, rad per SI unit |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -66,6 +68,7 @@ pub mod matrix;
 #[cfg(not(feature = "host"))]
 mod matrix;
 pub mod model;
+pub mod motion;
 pub mod parameters;
 pub mod pose;
 pub mod prediction;
@@ -88,6 +91,7 @@ pub use calibration::Calibration;
 pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;
 pub use model::{FieldModel, LinearModel, Model, ModelKind};
+pub use motion::{MotionCorrection, PlanarMotion};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use prediction::Predictor;

@@ -3,6 +3,7 @@
 use crate::decoder::{AnyDecoder, Decoder, DecoderConstants};
 use crate::geometry::ProbeGeometry;
 use crate::model::{ModelKind, Probes};
+use crate::motion::MotionCorrection;
 use heapless::String;
 use nalgebra::Matrix3;
 
@@ -53,6 +54,9 @@ pub struct ParameterSet {
     pub probes: Probes<f32>,
     /// The other numbers that the tick reads: the terms above, combined.
     pub constants: DecoderConstants<f32>,
+    /// Corrects poses by commanded velocity and acceleration; `None` where the calibration has no such
+    /// correction.
+    pub motion_correction: Option<MotionCorrection>,
 }
 
 /// How Hall codes become displacements at the designed sensitivity.
@@ -153,6 +157,9 @@ pub enum ParameterError {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
+    /// A motion correction is larger than any stage has, so its unit is wrong.
+    #[error("the motion correction is too large")]
+    LargeMotionCorrection,
     /// A window of accepted codes is empty or reaches beyond 24 bits.
     #[error("the window of accepted {sensors} codes is empty or reaches beyond 24 bits")]
     UnsoundWindow {

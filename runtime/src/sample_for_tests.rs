@@ -5,6 +5,7 @@ use crate::frame::CodeWindow;
 use crate::geometry::{ProbeGeometry, SensingAxes};
 use crate::matrix::inverse;
 use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
+use crate::motion::MotionCorrection;
 use crate::parameters::{FitRecord, ParameterSet, Text};
 use crate::temperature::Temperature;
 use nalgebra::RowVector3;
@@ -43,6 +44,7 @@ pub(crate) fn calibration() -> Calibration {
         calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
         sensitivity_min: Calibration::SENSITIVITY_MIN,
         temperature: Temperature::NONE,
+        motion_correction: None,
     }
 }
 
@@ -146,11 +148,40 @@ pub(crate) fn temperature() -> Temperature<f64> {
     }
 }
 
-/// The parameter set of [`field_calibration`] with [`temperature`].
-pub(crate) fn warm_parameters() -> ParameterSet {
+/// [`field_calibration`] with [`temperature`].
+pub(crate) fn warm_calibration() -> Calibration {
     Calibration {
         temperature: temperature(),
         ..field_calibration()
+    }
+}
+
+/// Its parameter set.
+pub(crate) fn warm_parameters() -> ParameterSet {
+    warm_calibration()
+        .prepare(&origin())
+        .expect("a sound stage")
+}
+
+/// A and L as of a coil 5 cm from probe A, and of probes that are read up to 0.3 ms apart.
+pub(crate) const MOTION: MotionCorrection = MotionCorrection {
+    acceleration_s2: [
+        [-6e-6, 2e-6, -3e-7],
+        [-3e-6, -1e-6, 2e-7],
+        [-1.5e-5, 5e-6, -8e-7],
+    ],
+    velocity_s: [
+        [1e-4, 2.5e-4, 9e-5],
+        [3e-5, -2e-4, 6e-5],
+        [-7e-5, 1.4e-3, 1e-4],
+    ],
+};
+
+/// The parameter set of a calibration with [`MOTION`].
+pub(crate) fn with_motion(calibration: Calibration) -> ParameterSet {
+    Calibration {
+        motion_correction: Some(MOTION),
+        ..calibration
     }
     .prepare(&origin())
     .expect("a sound stage")

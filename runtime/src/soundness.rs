@@ -17,11 +17,20 @@ const INVERSE_TOLERANCE: f32 = 1e-5;
 /// four roundings of `f32`.
 const PRODUCT_TOLERANCE: f32 = 5e-7;
 
+/// Largest element of A that the check accepts. A coil at 5 cm or an arm of 80 Hz gives up to 1.1e-5 s2 in X
+/// and Y, and 2e-4 rad per m/s2 where the probes stand 5 cm apart. The same in um would be 1 and more.
+const ACCELERATION_MAX: f32 = 1e-2;
+
+/// Largest element of L that the check accepts. A probe that is 2 ms late gives up to 2e-3 s in X and Y, and
+/// 4e-2 rad/m where the probes stand 5 cm apart. The same in ms would be 1 and more.
+const VELOCITY_MAX: f32 = 0.1;
+
 impl ParameterSet {
     /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
     /// from its parts, scales and limits are above zero, ranges at most [`RANGE_MAX`], code windows
-    /// sound, and no phi comes near zero within the calibrated range. Of a field model lateral rows must be across
-    /// the sensing axes, and the slopes of p below 1 in that range.
+    /// sound, a motion correction as small as on a stage, and no phi comes near zero within the calibrated
+    /// range. Of a field model lateral rows must be across the sensing axes, and the slopes of p below 1 in
+    /// that range.
     ///
     /// # Errors
     /// The first condition that does not hold.
@@ -35,6 +44,7 @@ impl ParameterSet {
         self.check_signs()?;
         self.check_inverse()?;
         self.check_products()?;
+        self.check_motion()?;
         let c = &self.constants;
         for (probe, s) in (0u8..).zip(self.probes.sensitivities()) {
             if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
@@ -91,6 +101,20 @@ impl ParameterSet {
             if !window.is_sound() {
                 return Err(ParameterError::UnsoundWindow { sensors });
             }
+        }
+        Ok(())
+    }
+
+    fn check_motion(&self) -> Result<(), ParameterError> {
+        let Some(motion) = &self.motion_correction else {
+            return Ok(());
+        };
+        let large =
+            |matrix: &[[f32; 3]; 3], most| matrix.as_flattened().iter().any(|x| x.abs() > most);
+        if large(&motion.acceleration_s2, ACCELERATION_MAX)
+            || large(&motion.velocity_s, VELOCITY_MAX)
+        {
+            return Err(ParameterError::LargeMotionCorrection);
         }
         Ok(())
     }

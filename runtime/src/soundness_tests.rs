@@ -51,6 +51,15 @@ fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
         ("the calibrated range", |s, x| s.constants.calibrated_planar[2] = x),
         ("the smallest sensitivity", |s, x| s.constants.sensitivity_min = x),
     ];
+    let of_motion: [(&str, ChangeTo); 2] = [
+        ("the motion correction", |s, x| {
+            motion(s).acceleration_s2[2][0] = x
+        }),
+        ("the motion correction", |s, x| {
+            motion(s).velocity_s[1][2] = x
+        }),
+    ];
+    #[rustfmt::skip]
     let of_field: [(&str, ChangeTo); 3] = [
         ("the field terms", |s, x| field_probes(s)[1].carry[2] = x),
         ("the field terms", |s, x| field_probes(s)[2].shape.w_w_w = x),
@@ -62,6 +71,10 @@ fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
         }
         for (group, change) in of_field {
             assert_eq!(refused_field(|set| change(set, bad)), NotFinite { group });
+        }
+        for (group, change) in of_motion {
+            let set = sample::with_motion(sample::calibration());
+            assert_eq!(refused(set, |set| change(set, bad)), NotFinite { group });
         }
     }
 }
@@ -110,6 +123,26 @@ fn what_cannot_be_or_does_not_follow_is_refused_by_its_reason() {
     assert!(is_steep(refused_field(
         |s| s.constants.calibrated_planar[1] = 0.05
     )));
+}
+
+/// The motion correction of [`sample::with_motion`], to be changed.
+fn motion(set: &mut ParameterSet) -> &mut crate::MotionCorrection {
+    set.motion_correction.as_mut().expect("a correction")
+}
+
+#[test]
+fn a_motion_correction_in_another_unit_is_refused() {
+    let changes: [ChangeTo; 2] = [
+        |set, unit| motion(set).acceleration_s2[0][0] *= 1e6 * unit,
+        |set, unit| motion(set).velocity_s[1][1] *= 1e3 * unit,
+    ];
+    for change in changes {
+        for sign in [-1.0, 1.0] {
+            let set = sample::with_motion(sample::warm_calibration());
+            let why = refused(set, |set| change(set, sign));
+            assert_eq!(why, ParameterError::LargeMotionCorrection);
+        }
+    }
 }
 
 /// A sensing axis twice as long as a unit vector.

@@ -8,7 +8,7 @@
 
 static HallDecoder decoder;
 static HallServo servo;
-static uint8_t blob[656];
+static uint8_t blob[728];
 static uint32_t frames[256][9];
 static HallReading readings[256];
 

@@ -354,6 +354,7 @@ fn prepare(
         calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
         sensitivity_min: old.constants.sensitivity_min.into(),
         temperature,
+        motion_correction: old.motion_correction,
         ..made.map_err(RecalibrateError::Unusable)?
     };
     made.prepare(origin).map_err(RecalibrateError::Unusable)

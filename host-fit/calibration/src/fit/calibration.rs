@@ -43,6 +43,7 @@ pub fn calibration<'r>(
         calibrated_vertical: vertical.map(|x| x * RANGE_MARGIN),
         sensitivity_min: Calibration::SENSITIVITY_MIN,
         temperature: Temperature::NONE,
+        motion_correction: None,
     })
 }
 

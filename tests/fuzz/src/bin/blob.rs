@@ -1,12 +1,12 @@
 //! A parameter blob, unchanged and with the right check behind it. An accepted blob decodes any codes
-//! to a pose or to a status that says why not, and is written as the same set.
+//! to a pose or to a status that says why not, and is written as the same set. A motion correction gives a pose.
 
 #![no_main]
 
 use crc::{CRC_32_ISCSI, Crc};
 use libfuzzer_sys::fuzz_target;
 use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAX_BYTES};
-use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
+use runtime::{Decode, ParameterSet, PlanarMotion, PlanarPose, RawFrame};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
@@ -40,6 +40,14 @@ fuzz_target!(|data: &[u8]| {
         assert!(q.iter().chain(&v).all(|x| x.is_finite()));
         assert!(reading.planar().is_some() || q == [0.0; 3]);
         assert!(reading.vertical().is_some() || v == [0.0; 3]);
+        if let Some(correction) = set.motion_correction {
+            let commanded = PlanarMotion {
+                velocity: [1.0, -1.0, 10.0],
+                acceleration: [-10.0, 10.0, 100.0],
+            };
+            let corrected = correction.correct(reading.pose.planar, &commanded);
+            assert!(corrected.is_some());
+        }
     }
 });
 

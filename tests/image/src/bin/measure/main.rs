@@ -18,8 +18,8 @@ use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::Decoder;
 use runtime::model::{FieldProbe, Sensitivity};
 use runtime::{
-    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, Predictor,
-    RawFrame, Reading, VerticalPose,
+    Decode, FieldModel, LinearModel, Model, MotionCorrection, OnInvalid, PlanarMotion, PlanarPose,
+    PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
 };
 
 /// Displacements read by the probes.
@@ -112,6 +112,18 @@ fn counted_prediction(
 ) -> Option<PlanarPose<f32>> {
     predictor.take(tracker, frame, reading);
     predictor.pose_at(frame.time_us.wrapping_add(300))
+}
+
+/// The pose without the errors that follow the commanded motion.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn counted_motion(
+    correction: &MotionCorrection,
+    pose: &PlanarPose<f32>,
+    commanded: &PlanarMotion,
+    corrected: &mut Option<PlanarPose<f32>>,
+) {
+    *corrected = correction.correct(*pose, commanded);
 }
 
 /// Codes the two bus frames of a tick (16-bit layout).
@@ -274,6 +286,23 @@ fn main() -> ! {
         black_box(&pose);
         counted_field_tick(&decoder, &frame, &zero, &mut reading);
         black_box(&reading);
+        // Any words, NaN among them, and numbers as at work.
+        let mut number = || match k % 3 {
+            0 => f32::from_bits(words.next()),
+            _ => words.next() as i32 as f32 * 1e-15,
+        };
+        let mut three = || [number(), number(), number()];
+        let correction = MotionCorrection {
+            acceleration_s2: [three(), three(), three()],
+            velocity_s: [three(), three(), three()],
+        };
+        let commanded = PlanarMotion {
+            velocity: three(),
+            acceleration: three(),
+        };
+        let mut corrected = None;
+        counted_motion(&correction, &pose, &commanded, &mut corrected);
+        black_box(corrected);
     }
     let decoder = black_box(Decoder::<LinearModel>::new(SOUND, PROBES));
     let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
