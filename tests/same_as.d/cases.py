@@ -132,7 +132,7 @@ def imports():
     for layout in ("16", "24"):
         record = f"{IN}/bus-{layout}.log"
         for what in ([], ["--offset-us", "3000"]):
-            arguments = ["import", record, f"{IN}/interferometer.csv", "--layout", layout, *written, *what]
+            arguments = ["import", record, f"{IN}/interferometer.csv", *written, *what]
             yield Case(f"import, {layout} bits, {' '.join(what)}", arguments)
 
 

@@ -20,9 +20,10 @@ pub mod reference;
 pub use error::ImportError;
 
 use crate::bus::BusAddress;
+use crate::cli::arguments::between;
 use crate::output::Output;
 use bus_log::BusCounts;
-use hal_adapters::can::Layout;
+use clap::Args;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
@@ -33,34 +34,49 @@ use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
 use std::path::PathBuf;
 
-/// The settings of an import.
-#[derive(Clone, Debug)]
-pub struct ImportSettings {
-    /// Record of the bus, written by `record`, `live --record` or `candump -L`.
-    pub bus: PathBuf,
-    /// Log of the interferometers: CSV with time, movement and beams (or pose), in the columns that
-    /// stage.toml names.
-    pub reference: PathBuf,
+/// Arguments of `import`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// Record of the bus, as `record`, `live --record` or `candump -L` writes it.
+    #[arg(value_name = "CANDUMP")]
+    pub(crate) bus: PathBuf,
+    /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
+    /// columns that stage.toml names.
+    #[arg(value_name = "REFERENCE")]
+    pub(crate) reference: PathBuf,
     /// The stage as designed.
-    pub stage: PathBuf,
+    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
+    pub(crate) stage: PathBuf,
     /// Where to write the calibration log.
-    pub out: PathBuf,
-    /// Largest time from a tick to the reference samples before and after it, us; one servo period if
-    /// `None`.
-    pub tolerance_us: Option<u32>,
-    /// Start of the search: time of the bus less time of the reference, us. `None`: both records start
+    #[arg(long, value_name = "LOG.csv")]
+    pub(crate) out: PathBuf,
+    /// Largest time from a tick to the reference samples before and after it, us; one servo
+    /// period if not given.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(crate) tolerance_us: Option<u32>,
+    /// Start of the search: time of the bus less time of the reference, us. Without it, both records start
     /// together.
-    pub offset_us: Option<f64>,
+    #[arg(long, value_name = "US", allow_negative_numbers = true)]
+    pub(crate) offset_us: Option<f64>,
     /// How far from its start the offset is searched, s.
-    pub search_s: f64,
-    /// Use only the frames of this interface; can0@5 for the frames of node 5.
-    pub interface: Option<BusAddress>,
-    /// Layout of the codes; `None`: the layout of the first frame with codes.
-    pub layout: Option<Layout>,
-    /// Skip and count lines that cannot be read.
-    pub skip_bad_lines: bool,
-    /// Shows how far the reading is, and can end it.
-    pub watch: Watch<'static>,
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 2.0,
+        value_parser = search_seconds
+    )]
+    pub(crate) search_s: f64,
+    /// Only frames of this interface, where the record holds several; can0@5 for the frames of node 5.
+    #[arg(long, value_name = "IFACE")]
+    pub(crate) interface: Option<BusAddress>,
+    /// Leave out lines that cannot be read, and count them.
+    #[arg(long)]
+    pub(crate) skip_bad_lines: bool,
+}
+
+/// For records further apart than an hour, `--offset-us` gives the start.
+fn search_seconds(text: &str) -> Result<f64, String> {
+    between(text, 0.0, 3600.0, "a number of seconds")
 }
 
 /// The result of an import.
@@ -85,9 +101,12 @@ const TEXT_BYTES: usize = 1 << 16;
 ///
 /// # Errors
 /// See [`ImportError`]; nothing is written then.
-pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
+pub(crate) fn run(
+    settings: &ImportArgs,
+    watch: Watch<'static>,
+) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let (run, bus) = bus_reader::read(settings, &stage)?;
+    let (run, bus) = bus_reader::read(settings, &stage, watch)?;
     let reference = Reference::read(&settings.reference, &stage)?;
     let records = Records::new(&run, &reference, &stage);
     let (clocks, offset) = records.estimate(settings.offset_us, settings.search_s * 1e6)?;

@@ -10,40 +10,50 @@ mod run;
 
 pub use bus::BusError;
 pub(crate) use bus::{Bus, now_us};
-pub use run::run;
+pub(crate) use run::run;
 
 use crate::bus::BusAddress;
+use crate::cli::arguments::{hold, seconds};
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
+use clap::Args;
 use runtime::OnInvalid;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The settings of `live`.
-#[derive(Clone, Debug)]
-pub struct LiveSettings {
+/// Arguments of `live`.
+#[derive(Debug, Args)]
+pub(crate) struct LiveArgs {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
-    pub can: BusAddress,
+    #[arg(long, value_name = "IFACE")]
+    pub(crate) can: BusAddress,
     /// The parameter blob.
-    pub params: PathBuf,
-    /// Refuse a blob without this serial number.
-    pub serial: Option<String>,
+    #[arg(value_name = "params.bin")]
+    pub(crate) params: PathBuf,
+    /// Refuse a blob unless its stage has this serial number.
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) serial: Option<String>,
     /// Record every frame received and sent, as `candump -L` does, in a new file.
-    pub record: Option<PathBuf>,
-    /// How long the last valid pose is repeated where codes are bad.
-    pub hold: OnInvalid,
-    /// Ticks between two frames of a vertical axis: 1, 2, 4, 8 or 16.
-    pub vertical_every: u8,
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Repeat the last valid pose for at most N ticks where codes are bad.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
+    pub(crate) hold: OnInvalid,
     /// Send nothing: only watch, record and show.
-    pub listen_only: bool,
-    /// When to end; `None`: on Ctrl-C.
-    pub duration: Option<Duration>,
-    /// Time from line to line where output is no terminal.
-    pub every: Duration,
-    /// Time after which an incomplete tick is given up, us.
-    pub assembly_us: u32,
-    /// Time without a good frame after which the sensors are stale, us.
-    pub stale_us: u32,
+    #[arg(long)]
+    pub(crate) listen_only: bool,
+    /// End after this many seconds; without it, on Ctrl-C.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub(crate) duration: Option<Duration>,
+    /// Seconds from line to line where output is no terminal.
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    pub(crate) every: Duration,
+    /// Give up a tick if frames are still missing after this time.
+    #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) assembly_us: u32,
+    /// Call the sensors stale after this time without a good frame.
+    #[arg(long, value_name = "US", default_value_t = 3_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(crate) stale_us: u32,
 }
 
 /// Why `live` ended early.

@@ -1,7 +1,6 @@
 //! Settings that are chosen by name, on the command line and in Python.
 
 use crate::output::pose_file::PoseFormat;
-use hal_adapters::can::Layout;
 use hallstage_calibration::fit::ModelChoice;
 use hallstage_calibration::judge::Zeros;
 use hallstage_input::log::BadRows;
@@ -68,20 +67,6 @@ values! {
     PoseFormat {
         Csv: "csv", "Text";
         Npy: "npy", "A structured array for numpy.load, in SI units, the decoder's words bit for bit";
-    }
-}
-
-impl Choice for Option<Layout> {
-    fn all() -> Vec<(Self, &'static str, &'static str)> {
-        vec![
-            (
-                None,
-                "auto",
-                "As the converters' codes, or the record, need it",
-            ),
-            (Some(Layout::Bits16), "16", "16 bits: two frames a tick"),
-            (Some(Layout::Bits24), "24", "24 bits: three frames a tick"),
-        ]
     }
 }
 

@@ -102,7 +102,7 @@ commands! {
     /// Bring a parameter blob up to date by a few seconds of log.
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(import::ImportArgs) => import::run,
+    Import(crate::bus::import::ImportArgs) => import::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.
@@ -112,7 +112,7 @@ commands! {
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(live::LiveArgs) => live::run,
+    Live(crate::bus::live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs) => record::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).

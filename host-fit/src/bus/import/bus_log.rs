@@ -56,6 +56,7 @@ const TIMING: Timing = Timing {
 /// Frames to whole ticks, counted.
 #[derive(Clone, Debug, Default)]
 pub(in crate::bus) struct Collector {
+    /// As the first frame with codes shows.
     layout: Option<Layout>,
     receiver: Option<SensorReceiver>,
     counts: BusCounts,
@@ -64,14 +65,6 @@ pub(in crate::bus) struct Collector {
 }
 
 impl Collector {
-    /// Without a given layout the first frame with codes decides.
-    pub(in crate::bus) fn new(layout: Option<Layout>) -> Self {
-        Self {
-            layout,
-            ..Self::default()
-        }
-    }
-
     /// Takes a frame; gives the tick that it completes.
     pub(in crate::bus) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
         self.counts.frames += 1;

@@ -2,7 +2,7 @@
 
 use super::bus_log::{BusCounts, BusTick, Collector};
 use super::node_clock::{NodeClock, NodeRun};
-use super::{ImportError, ImportSettings};
+use super::{ImportArgs, ImportError};
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
@@ -11,6 +11,7 @@ use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
+use hallstage_input::watch::Watch;
 
 /// Most ticks of a record: two hours at 500 Hz.
 const TICKS_MAX: usize = 3_600_000;
@@ -20,8 +21,9 @@ const TICKS_MAX: usize = 3_600_000;
 /// # Errors
 /// `Log`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
 pub(super) fn read(
-    settings: &ImportSettings,
+    settings: &ImportArgs,
     stage: &Stage,
+    watch: Watch<'static>,
 ) -> Result<(NodeRun, BusCounts), ImportError> {
     let mut reader = BusReader {
         settings,
@@ -32,12 +34,12 @@ pub(super) fn read(
             .interface
             .as_ref()
             .map_or(NodeNumber::default(), |at| at.node),
-        collector: Collector::new(settings.layout),
+        collector: Collector::default(),
         clock: NodeClock::new(stage.servo_period_s * 1e6),
         counts: BusCounts::default(),
     };
     let text = TextReader::open(&settings.bus).map_err(LogError::from)?;
-    let mut lines = Lines::new(text).watched(settings.watch, "reading the bus");
+    let mut lines = Lines::new(text).watched(watch, "reading the bus");
     while let Some(line) = lines.next_line()? {
         reader.take_line(&String::from_utf8_lossy(line))?;
         if reader.clock.timed() > TICKS_MAX {
@@ -74,7 +76,7 @@ const TICKS_MIN: usize = 125;
 
 /// A record of the bus while it is read.
 struct BusReader<'s> {
-    settings: &'s ImportSettings,
+    settings: &'s ImportArgs,
     stage: &'s Stage,
     /// Number of the current line, from 1.
     line: usize,

@@ -3,6 +3,7 @@
 
 use super::tests::files;
 use super::*;
+use hal_adapters::can::Layout;
 use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::{BusFrame, Coded, PoseSender};
 use hal_adapters::candump::LogLine;
@@ -102,7 +103,7 @@ fn try_import(
     let import = files(&candump(controller), &reference(interferometer));
     std::fs::write(&import.settings.stage, stage).expect("written");
     let import = import.with(|settings| settings.search_s = 0.1);
-    let report = run(&import.settings)?;
+    let report = run(&import.settings, Watch::NONE)?;
     let rows = import.log().rows;
     let distance = rows.iter().flat_map(|row| {
         let [x, y, rz] = row.reference;

@@ -44,8 +44,8 @@ pub enum ImportError {
     /// The record holds no whole ticks that can be timed.
     #[error(
         "{}: no tick can be timed: {frames} frames are {ticks} whole ticks, {saturated} with a code at a rail of its converter; it takes \
-         125 ticks, and the sensor node's time frames (0x15A) before and after them, 16 servo periods apart. Is it the right record, \
-         layout and interface, does it hold all of the node's frames, and is period_s of stage.toml right?",
+         125 ticks, and the sensor node's time frames (0x15A) before and after them, 16 servo periods apart. Is it the right record \
+         and interface, does it hold all of the node's frames, and is period_s of stage.toml right?",
         path.display()
     )]
     NoTicks {
@@ -61,7 +61,7 @@ pub enum ImportError {
     /// A code is beyond the range of the converter.
     #[error(
         "{}, line {line}: the code {code} of {sensor} is outside the converter's range {code_min} to {code_max}; is it the \
-         right record and --layout? Then correct code_min and code_max in stage.toml",
+         right record? Then correct code_min and code_max in stage.toml",
         path.display()
     )]
     OutsideConverter {

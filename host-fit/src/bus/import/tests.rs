@@ -1,4 +1,5 @@
 use super::*;
+use hal_adapters::can::Layout;
 use hal_adapters::can::{BusFrame, Coded, sensor};
 use hal_adapters::candump::{LineError, LogLine};
 use hallstage_input::log::{self, ReadOptions};
@@ -91,7 +92,7 @@ pub(super) fn reference() -> String {
 /// Two records and their stage in a folder, and how they are joined.
 pub(super) struct Import {
     _folder: TempDir,
-    pub(super) settings: ImportSettings,
+    pub(super) settings: ImportArgs,
 }
 
 pub(super) fn files(bus: &str, reference: &str) -> Import {
@@ -100,7 +101,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), hallstage_input::shipped::STAGE_TOML).expect("written");
-    let settings = ImportSettings {
+    let settings = ImportArgs {
         bus: path("bus.log"),
         reference: path("ifm.csv"),
         stage: path("stage.toml"),
@@ -109,9 +110,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
         offset_us: None,
         search_s: 0.4,
         interface: None,
-        layout: None,
         skip_bad_lines: false,
-        watch: Watch::NONE,
     };
     Import {
         _folder: folder,
@@ -121,19 +120,19 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
 
 impl Import {
     /// With another setting.
-    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportSettings)) -> Self {
+    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportArgs)) -> Self {
         change(&mut self.settings);
         self
     }
 
     pub(super) fn run(&self) -> ImportReport {
-        run(&self.settings).unwrap_or_else(|error| panic!("{error}"))
+        run(&self.settings, Watch::NONE).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// Imports, sees that it is refused, and that nothing is written.
     #[track_caller]
     pub(super) fn refused(&self, is_why: impl Fn(&ImportError) -> bool) -> String {
-        let error = run(&self.settings).expect_err("refused");
+        let error = run(&self.settings, Watch::NONE).expect_err("refused");
         assert!(is_why(&error), "{error}");
         assert!(!self.settings.out.exists(), "{error}");
         error.to_string()
@@ -221,7 +220,7 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
         };
         let bus = candump_with(|_, _| false, noisy);
         let import = files(&bus, &reference());
-        let outcome = run(&import.settings);
+        let outcome = run(&import.settings, Watch::NONE);
         assert_eq!(outcome.is_ok(), import.settings.out.exists());
         outcome.map(|report| report.offset.standard_error_us)
     };

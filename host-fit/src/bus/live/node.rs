@@ -14,6 +14,9 @@ const TICKS_PER_S: u32 = 1_000_000 / SILENT_US;
 /// Time from pose to pose while the sensors are silent, us.
 const SILENT_US: u32 = 2_000;
 
+/// Ticks between two frames of a vertical axis.
+const VERTICAL_TICKS: u8 = 4;
+
 /// The settings of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeSettings {
@@ -23,8 +26,6 @@ pub struct NodeSettings {
     pub timing: Timing,
     /// The value of an invalid field.
     pub on_invalid: OnInvalid,
-    /// Ticks between two frames of a vertical axis.
-    pub vertical_ticks: u8,
 }
 
 /// The result of a frame, or of time that passed.
@@ -59,7 +60,7 @@ impl Node {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
             tracker: PoseTracker::new(decoder, settings.on_invalid),
-            poses: PoseSender::new(settings.vertical_ticks),
+            poses: PoseSender::new(VERTICAL_TICKS),
             service: Service::new(TICKS_PER_S),
             ticks: 0,
         }

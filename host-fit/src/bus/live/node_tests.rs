@@ -10,7 +10,6 @@ const SETTINGS: NodeSettings = NodeSettings {
         stale_us: 3_000,
     },
     on_invalid: OnInvalid::Zero,
-    vertical_ticks: 4,
 };
 
 fn decoder() -> AnyDecoder {
