@@ -5,7 +5,6 @@ use crate::statistics::median;
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
 use std::borrow::Cow;
-use std::hash::{Hash, Hasher};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -91,14 +90,6 @@ pub struct Row {
     pub vertical: [f64; 3],
     /// X, Y, Rz by the interferometers: m, m, rad. Zeros in a log without reference.
     pub reference: [f64; 3],
-}
-
-impl Hash for Row {
-    fn hash<H: Hasher>(&self, hash: &mut H) {
-        (self.t_us, self.frame.hall()).hash(hash);
-        self.vertical.map(f64::to_bits).hash(hash);
-        self.reference.map(f64::to_bits).hash(hash);
-    }
 }
 
 /// One movement of one log: between its start and its end the interferometers were not reset.

@@ -181,10 +181,15 @@ fn read_texts<'t>(
     let mut reading = LogReading::default();
     let mut sampler = Sampler::new(options.rows_max);
     let mut hash = Sha256::new();
-    let mut logs = 0;
+    let mut files = Vec::new();
     for (log, text) in texts.into_iter().enumerate() {
         let text = text?.with_hash(hash);
         let path = text.path().to_path_buf();
+        let file = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if files.contains(&file) {
+            return Err(Place::new(path, None).refuse(LogProblem::SameLog));
+        }
+        files.push(file);
         sampler.begin_log();
         let mut rows = LogRows::new(text, "reading", stage, options)?;
         while let Some(row) = rows.next_row()? {
@@ -201,14 +206,10 @@ fn read_texts<'t>(
             movements_read: 0,
             has_reference: end.has_reference,
         };
-        if let Some(first) = sampler.end_log(source) {
-            let first = first.path.clone();
-            return Err(Place::new(path, None).refuse(LogProblem::SameLog { first }));
-        }
+        sampler.end_log(source);
         hash = end.hash.unwrap_or_default();
-        logs += 1;
     }
-    if logs == 0 {
+    if files.is_empty() {
         return Err(Place::new("", None).refuse(LogProblem::NoLog));
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());

@@ -9,7 +9,6 @@
 use crate::dataset::{Dataset, LogSource, Movement, Row};
 use crate::stage;
 use runtime::Temperature;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
 /// Rows of a run: a second, as long as the period of the paper's motions.
@@ -47,8 +46,6 @@ struct Log {
     /// Number of rows and movements.
     rows: usize,
     movements: usize,
-    /// Of all its rows.
-    digest: DefaultHasher,
 }
 
 impl Log {
@@ -97,7 +94,6 @@ impl Sampler {
             counts: [0; 2],
             rows: 0,
             movements: 0,
-            digest: DefaultHasher::new(),
         });
     }
 
@@ -122,22 +118,19 @@ impl Sampler {
         if let Some(log) = self.logs.last_mut() {
             log.rows += 1;
             log.movements += usize::from(begins);
-            row.hash(&mut log.digest);
         }
         if self.rows.len() >= self.too_many {
             self.thin();
         }
     }
 
-    /// Ends the log. Returns an earlier log with the same rows, if any.
-    pub(super) fn end_log(&mut self, mut source: LogSource) -> Option<&LogSource> {
+    /// Ends the log.
+    pub(super) fn end_log(&mut self, mut source: LogSource) {
         self.end_run();
-        let (last, earlier) = self.logs.split_last()?;
-        (source.rows_read, source.movements_read) = (last.rows, last.movements);
+        if let Some(last) = self.logs.last() {
+            (source.rows_read, source.movements_read) = (last.rows, last.movements);
+        }
         self.sources.push(source);
-        let digest = last.digest.finish();
-        let same = earlier.iter().position(|log| log.digest.finish() == digest);
-        same.and_then(|log| self.sources.get(log))
     }
 
     /// Gives the last run its place.

@@ -24,10 +24,8 @@ pub struct Output {
 enum Sink {
     /// A new file beside the target.
     Beside(NamedTempFile),
-    /// A new file at the target from the start.
+    /// A device, a pipe, or a new file at the target from the start.
     Placed(File),
-    /// A device or a pipe.
-    Device(File),
     StandardOutput,
 }
 
@@ -56,7 +54,7 @@ impl Output {
             (path.to_owned(), Ok(Sink::StandardOutput))
         } else if is_stream(path) {
             let device = OpenOptions::new().append(true).open(path);
-            (path.to_owned(), device.map(Sink::Device))
+            (path.to_owned(), device.map(Sink::Placed))
         } else {
             let target = target(path)?;
             let sink = create(&target);
@@ -86,7 +84,7 @@ impl Output {
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
         let written = match &mut self.sink {
             Sink::Beside(file) => file.write_all(bytes),
-            Sink::Placed(file) | Sink::Device(file) => file.write_all(bytes),
+            Sink::Placed(file) => file.write_all(bytes),
             Sink::StandardOutput => std::io::stdout().write_all(bytes),
         };
         written.map_err(|source| self.failed(source))
@@ -118,8 +116,11 @@ impl Output {
                 let set = old.map_or(Ok(()), |permissions| file.set_permissions(permissions));
                 set.and_then(|()| file.sync_all())
             }
-            Sink::Placed(file) => file.sync_all(),
-            Sink::Device(file) => file.flush(),
+            // A pipe has no disk.
+            Sink::Placed(file) => file.sync_all().or_else(|error| match error.kind() {
+                ErrorKind::InvalidInput => Ok(()),
+                _ => Err(error),
+            }),
             Sink::StandardOutput => std::io::stdout().flush(),
         };
         done.map_err(|source| self.failed(source))
@@ -139,24 +140,6 @@ impl Output {
             let _ = File::open(folder(&self.target)).and_then(|folder| folder.sync_all());
         }
         Ok(())
-    }
-
-    /// Cuts a new file to whole lines after a write that failed: `before` bytes, then the lines of `bytes` that are
-    /// in the file.
-    pub(super) fn cut_to_lines(&mut self, before: u64, bytes: &[u8]) {
-        if let Sink::Placed(file) = &mut self.sink {
-            let end = file.metadata().map_or(before, |metadata| metadata.len());
-            let there = end.saturating_sub(before) as usize;
-            let lines = bytes.iter().take(there).rposition(|byte| *byte == b'\n');
-            let _ = file.set_len(before + lines.map_or(0, |end| end as u64 + 1));
-        }
-    }
-
-    /// Removes a new file.
-    pub(super) fn discard(self) {
-        if let Sink::Placed(_) = self.sink {
-            let _ = fs::remove_file(&self.target);
-        }
     }
 
     fn failed(&self, source: std::io::Error) -> OutputError {

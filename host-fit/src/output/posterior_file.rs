@@ -1,19 +1,7 @@
 //! The posterior of a fit as a file beside its blob: the prior of a recalibration.
 //!
-//! `params.bin.posterior` stands beside `params.bin`. All numbers are little-endian.
-//!
-//! | offset | bytes | what |
-//! |---|---|---|
-//! | 0 | 8 | magic, `HALLPOST` in ASCII |
-//! | 8 | 4 | layout version: 1, 2 with the text below, or 3 with k and h |
-//! | 12 | 32 | SHA-256 of the blob that it belongs to |
-//! | 44 | 24 | white noise of the probes A, B, C, mm, as `f64` |
-//! | 68 | 24 | walk of the reference in X, Y, Rz in a second, mm, mm, mrad, as `f64` |
-//! | 92 | 8 | chi-square over residuals, as `f64` |
-//! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
-//! | 26,668 | 4,056 | layout 3: six more rows of it, of k and h of A, B and C |
-//! | | | layouts 2 and 3: the faults of the log that the calibration is without, a line each, in UTF-8 |
-//! | the end | 32 | SHA-256 of everything before it |
+//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS2` in ASCII, the fields of [`Content`] in postcard,
+//! and the SHA-256 of all before it.
 
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
@@ -23,19 +11,31 @@ use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
 use runtime::ParameterSet;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-const MAGIC: [u8; 8] = *b"HALLPOST";
-/// Rows of the covariance with k and h.
-const ROWS_MAX: usize = COUNT + 6;
-const HASH_BYTES: usize = 32;
-const HEADER_BYTES: usize = 12 + HASH_BYTES;
-const TEXT_BYTES_MAX: usize = 8192;
+const MAGIC: &[u8] = b"HALLPOS2";
+/// Rows of the covariance without and with k and h.
+const ROWS: [usize; 2] = [COUNT, COUNT + 6];
+/// Largest file that is read.
+const BYTES_MAX: u64 = 1 << 16;
 
-/// Length without text.
-const fn bytes(rows: usize) -> usize {
-    HEADER_BYTES + 8 * (7 + rows * (rows + 1) / 2) + HASH_BYTES
+/// What the file holds.
+#[derive(Serialize, Deserialize)]
+struct Content {
+    /// SHA-256 of the blob that it belongs to.
+    blob: [u8; 32],
+    /// White noise of the probes A, B, C, mm.
+    white_mm: [f64; 3],
+    /// Walk of the reference in X, Y, Rz in a second, mm, mm, mrad.
+    drift_mm: [f64; 3],
+    /// Chi-square over residuals.
+    misfit: f64,
+    /// Covariance of the 81 parameters, or of these and k and h of A, B, C: the lower triangle row by row.
+    triangle: Vec<f64>,
+    /// The faults of the log that the calibration is without.
+    repaired: Vec<String>,
 }
 
 /// Why there is no posterior.
@@ -54,7 +54,7 @@ pub enum PosteriorFileError {
     #[error(transparent)]
     Read(#[from] SourceError),
     /// It is no posterior, or a damaged one.
-    #[error("{} is no posterior of this program: {problem}. Copy it again, or fit again", path.display())]
+    #[error("{} is no posterior of this program: {problem}. Copy it again, or make it again with host-fit fit", path.display())]
     Unusable {
         /// The file.
         path: PathBuf,
@@ -98,7 +98,7 @@ pub fn add_calibration(
     let blob = blob_file::to_bytes(path, set)?;
     match (known, beside(path)) {
         (Some(known), Some(beside)) => {
-            outputs.add(&beside, &encode(&Sha256::digest(&blob).into(), known))?;
+            outputs.add(&beside, &encode(Sha256::digest(&blob).into(), known))?;
         }
         (None, Some(beside)) => outputs.remove(beside),
         (_, None) => {}
@@ -115,8 +115,7 @@ pub fn read(
     set: &ParameterSet,
     blob: &Path,
 ) -> Result<StoredPosterior, PosteriorFileError> {
-    let most = (self::bytes(ROWS_MAX) + TEXT_BYTES_MAX) as u64;
-    let bytes = match read_whole(path, most) {
+    let bytes = match read_whole(path, BYTES_MAX) {
         Err(error) if matches!(error.problem, SourceProblem::NotFound) => {
             return Err(PosteriorFileError::Missing { path: error.path });
         }
@@ -137,90 +136,71 @@ pub fn read(
     Ok(known)
 }
 
-fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError> {
+fn blob_hash(set: &ParameterSet) -> Result<[u8; 32], runtime::BlobError> {
     let mut buffer = [0; runtime::blob::MAX_BYTES];
     Ok(Sha256::digest(set.to_bytes(&mut buffer)?).into())
 }
 
-fn encode(blob: &[u8; HASH_BYTES], known: &StoredPosterior) -> Vec<u8> {
-    let mut bytes = Vec::new();
+fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
     let StoredPosterior {
         covariance,
         noise: Noise { white_mm, drift_mm },
         misfit,
         repaired,
     } = known;
-    let rows = covariance.nrows();
-    let version: u32 = match (rows > COUNT, repaired.is_empty()) {
-        (true, _) => 3,
-        (false, true) => 1,
-        (false, false) => 2,
+    let rows = 0..covariance.nrows();
+    let content = Content {
+        blob,
+        white_mm: *white_mm,
+        drift_mm: *drift_mm,
+        misfit: *misfit,
+        triangle: (rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]))).collect(),
+        repaired: repaired.clone(),
     };
-    bytes.extend(MAGIC);
-    bytes.extend(version.to_le_bytes());
-    bytes.extend(blob);
-    let triangle = (0..rows).flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
-    let numbers = white_mm.iter().chain(drift_mm).chain([misfit]).copied();
-    for number in numbers.chain(triangle) {
-        bytes.extend(number.to_le_bytes());
-    }
-    bytes.extend(repaired.join("\n").bytes());
-    let hash = Sha256::digest(&bytes);
-    bytes.extend(hash);
+    // Into memory it does not fail.
+    let mut bytes = postcard::to_extend(&content, MAGIC.to_vec()).unwrap_or_default();
+    bytes.extend(Sha256::digest(&bytes));
     bytes
 }
 
 /// The hash of the blob and what is known, or what is wrong.
-fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], StoredPosterior), String> {
-    if !bytes.starts_with(&MAGIC) {
-        return Err("it does not begin with HALLPOST".to_owned());
-    }
-    let version = bytes
-        .get(MAGIC.len()..)
-        .and_then(|bytes| bytes.first_chunk());
-    let version = version.map(|version| u32::from_le_bytes(*version));
-    let rows = if version == Some(3) { ROWS_MAX } else { COUNT };
-    let least = self::bytes(rows);
-    let (content, hash) = match bytes.split_last_chunk::<HASH_BYTES>() {
-        Some(parts) if (least..=least + TEXT_BYTES_MAX).contains(&bytes.len()) => parts,
-        _ => {
-            return Err(format!(
-                "it has not the {least} bytes or more that it should have"
-            ));
-        }
+fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
+    let Some(start) = bytes.strip_prefix(MAGIC) else {
+        return Err("it does not begin with HALLPOS2".to_owned());
     };
-    if Sha256::digest(content)[..] != hash[..] {
+    let parts = start.split_last_chunk::<32>();
+    let (content, hash) = parts.ok_or("it is cut")?;
+    if Sha256::digest(&bytes[..MAGIC.len() + content.len()])[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let (numbers, text) = content.split_at(least - HASH_BYTES);
-    if version != Some(3) && version != Some(if text.is_empty() { 1 } else { 2 }) {
-        return Err("its layout is not 1, 2 or 3".to_owned());
-    }
-    let text = str::from_utf8(text).map_err(|error| error.to_string())?;
-    let (head, numbers) = numbers.split_at(HEADER_BYTES);
-    let mut blob = [0; HASH_BYTES];
-    blob.copy_from_slice(&head[HEADER_BYTES - HASH_BYTES..]);
-    let (numbers, _) = numbers.as_chunks::<8>();
-    let numbers: Vec<f64> = numbers.iter().map(|n| f64::from_le_bytes(*n)).collect();
-    let (noise, triangle) = numbers.split_at(7);
+    let content: Content = postcard::from_bytes(content).map_err(|error| error.to_string())?;
+    let triangle = &content.triangle;
+    let has_rows = |rows: &usize| triangle.len() == rows * (rows + 1) / 2;
+    let rows = ROWS
+        .into_iter()
+        .find(has_rows)
+        .ok_or("it has not 81 or 87 parameters")?;
     let covariance = DMatrix::from_fn(rows, rows, |i, j| {
         let (row, column) = (i.max(j), i.min(j));
         triangle[row * (row + 1) / 2 + column]
     });
-    let known = StoredPosterior {
-        covariance,
-        noise: Noise {
-            white_mm: [noise[0], noise[1], noise[2]],
-            drift_mm: [noise[3], noise[4], noise[5]],
-        },
-        misfit: noise[6],
-        repaired: text.lines().map(str::to_owned).collect(),
-    };
-    let sound = noise.iter().all(|x| *x >= 0.0 && x.is_finite());
-    if !sound || !is_covariance(&known.covariance) {
+    let Content {
+        white_mm,
+        drift_mm,
+        misfit,
+        ..
+    } = content;
+    let mut noise = [white_mm, drift_mm].concat().into_iter().chain([misfit]);
+    if !noise.all(|x| x >= 0.0 && x.is_finite()) || !is_covariance(&covariance) {
         return Err("its numbers are no noise and no covariance".to_owned());
     }
-    Ok((blob, known))
+    let known = StoredPosterior {
+        covariance,
+        noise: Noise { white_mm, drift_mm },
+        misfit,
+        repaired: content.repaired,
+    };
+    Ok((content.blob, known))
 }
 
 /// Whether a matrix is a covariance. It is scaled to a diagonal of ones first.
@@ -256,9 +236,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let bytes = encode(&[7; HASH_BYTES], &known());
-        assert_eq!(bytes.len(), 26_700);
-        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], known())));
+        let bytes = encode([7; 32], &known());
+        assert_eq!(from_bytes(&bytes), Ok(([7; 32], known())));
         let repaired = StoredPosterior {
             repaired: vec![
                 "the gain of Hall B changes by 1 µV".to_owned(),
@@ -266,12 +245,11 @@ mod tests {
             ],
             ..known()
         };
-        let bytes = encode(&[7; HASH_BYTES], &repaired);
-        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], repaired)));
+        let bytes = encode([7; 32], &repaired);
+        assert_eq!(from_bytes(&bytes), Ok(([7; 32], repaired)));
         let with_temperature = known_with_rows(COUNT + 6);
-        let bytes = encode(&[7; HASH_BYTES], &with_temperature);
-        assert_eq!(bytes.len(), 26_700 + 4_056);
-        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_temperature)));
+        let bytes = encode([7; 32], &with_temperature);
+        assert_eq!(from_bytes(&bytes), Ok(([7; 32], with_temperature)));
     }
 
     #[test]
@@ -291,7 +269,7 @@ mod tests {
 
     #[test]
     fn what_is_damaged_cut_or_no_covariance_is_refused() {
-        let bytes = encode(&[7; HASH_BYTES], &known());
+        let bytes = encode([7; 32], &known());
         for place in (0..bytes.len()).step_by(997).chain([9, bytes.len() - 1]) {
             let mut damaged = bytes.clone();
             damaged[place] ^= 0x10;
@@ -306,7 +284,7 @@ mod tests {
             known.covariance[(3, 2)] = value;
             known.covariance[(2, 3)] = value;
             known.covariance[(2, 2)] = value.min(1e-12);
-            let sound = from_bytes(&encode(&[7; HASH_BYTES], &known));
+            let sound = from_bytes(&encode([7; 32], &known));
             assert!(sound.is_err(), "{value}");
         }
     }

@@ -1,5 +1,6 @@
 //! A record of a bus: the file holds what has come, however the run ends.
 
+use super::file::is_stream;
 use super::{Output, OutputError};
 use std::io::Write;
 use std::path::Path;
@@ -10,18 +11,14 @@ const UNWRITTEN_MAX: Duration = Duration::from_secs(1);
 /// Bytes in memory that are written at once.
 const UNWRITTEN_BYTES: usize = 64 * 1024;
 
-/// A file that gains whole lines, each within a second. An existing file is never replaced. A device, a pipe and
-/// standard output (`-`) are written to directly.
+/// A file that gains lines, each within a second. An existing file is never replaced. A device, a pipe and
+/// standard output (`-`) are written to directly. Where a write fails, the last line may be cut; readers leave it out.
 #[derive(Debug)]
 pub struct RecordFile {
     output: Output,
     /// Lines that are not yet in the file.
     unwritten: Vec<u8>,
     since: Instant,
-    /// Bytes of the lines in the file.
-    written: u64,
-    /// Whether a line is lost. Then no line may follow.
-    has_ended: bool,
 }
 
 impl RecordFile {
@@ -34,19 +31,14 @@ impl RecordFile {
             output: Output::create_new(path)?,
             unwritten: Vec::with_capacity(UNWRITTEN_BYTES),
             since: Instant::now(),
-            written: 0,
-            has_ended: false,
         })
     }
 
-    /// Adds a line, unless one before it is lost.
+    /// Adds a line.
     ///
     /// # Errors
     /// As [`flush`](Self::flush).
     pub fn line(&mut self, text: impl std::fmt::Display) -> Result<(), OutputError> {
-        if self.has_ended {
-            return Ok(());
-        }
         if self.unwritten.is_empty() {
             self.since = Instant::now();
         }
@@ -72,18 +64,9 @@ impl RecordFile {
     /// Writes all lines.
     ///
     /// # Errors
-    /// [`OutputError`]. The file then ends with its last whole line, and gains no more.
+    /// [`OutputError`]; write no more lines then.
     pub fn flush(&mut self) -> Result<(), OutputError> {
-        let bytes = std::mem::take(&mut self.unwritten);
-        let written = self.output.write(&bytes);
-        match &written {
-            Ok(()) => self.written += bytes.len() as u64,
-            Err(_) => {
-                self.output.cut_to_lines(self.written, &bytes);
-                self.has_ended = true;
-            }
-        }
-        self.unwritten = bytes;
+        let written = self.output.write(&self.unwritten);
         self.unwritten.clear();
         written
     }
@@ -99,6 +82,8 @@ impl RecordFile {
 
     /// Removes the file.
     pub fn discard(self) {
-        self.output.discard();
+        if !is_stream(self.output.path()) {
+            let _ = std::fs::remove_file(self.output.path());
+        }
     }
 }

@@ -238,12 +238,9 @@ pub enum LogProblem {
         /// The line of the first row after it.
         left_line: usize,
     },
-    /// Two logs have the same rows.
-    #[error("the same rows as in {}; name each log once", first.display())]
-    SameLog {
-        /// The log with the same rows.
-        first: PathBuf,
-    },
+    /// A log is named twice.
+    #[error("named twice; name each log once")]
+    SameLog,
     /// All rows are bad.
     #[error(
         "every row is bad and was left out, {rows} in all (the first: {first}); record the log again"
