@@ -1,7 +1,7 @@
-//! The charts of a report: the errors over time, against pose, signals and temperatures, and their spectrum.
+//! The charts of a report: the errors over time, against pose, signals and temperatures; their spectrum.
 
 use super::axis::Axis;
-use super::chart::{Chart, Mark, Panel, Scale, Tone};
+use super::chart::{Chart, Mark, Tone};
 use super::errors::RowErrors;
 use super::series::{Column, band, columns};
 use hallstage_calibration::judge::spectrum::{Spectrum, windows};
@@ -18,8 +18,6 @@ const BINS: usize = 40;
 /// Longest and shortest window of the spectrum, rows.
 const WINDOW_MAX: usize = 4096;
 const WINDOW_MIN: usize = 32;
-/// Points of a spectrum, evenly over its logarithm.
-const POINTS: f64 = 250.0;
 
 /// A quantity of a row in um or urad, and its name.
 type Quantity = (&'static str, fn(&Row) -> f64);
@@ -69,33 +67,6 @@ impl Log<'_> {
         Mark::Borders(Tone::Grid, starts.filter(|_| few).collect())
     }
 
-    /// Panels over time. Each has a series in each of the tones, the hindmost first; `of` gives the value
-    /// of a row by tone and panel.
-    fn over_time(
-        &self,
-        caption: &str,
-        labels: [&str; 3],
-        tones: &[Tone],
-        of: impl Fn(Tone, usize, usize) -> Option<f64>,
-    ) -> Chart {
-        let rows = self.dataset.rows.len();
-        let end_s = rows.max(1) as f64 * self.period_s;
-        let panel = |k: usize| {
-            let series = tones.iter().map(|&tone| {
-                let values = (0..rows)
-                    .filter_map(|row| Some((row as f64 * self.period_s, of(tone, row, k)?)));
-                Mark::Band(tone, band(values, end_s, rows))
-            });
-            let marks = std::iter::once(self.borders()).chain(series).collect();
-            Panel::new(labels[k], Scale::Symmetric, marks)
-        };
-        Chart::with_three_panels(
-            caption,
-            ("time of the rows, s", Axis::Linear(0.0, end_s)),
-            panel,
-        )
-    }
-
     /// Errors over time (m, m, rad) on one scale, those before behind those after.
     pub(super) fn errors(
         &self,
@@ -103,14 +74,24 @@ impl Log<'_> {
         after: &RowErrors,
         before: Option<&RowErrors>,
     ) -> Chart {
-        let tones: &[Tone] = match before {
-            Some(_) => &[Tone::Noise, Tone::Data],
-            None => &[Tone::Data],
+        let rows = self.dataset.rows.len();
+        let end_s = rows.max(1) as f64 * self.period_s;
+        let panel = |axis: usize| {
+            let series = |(tone, errors): (Tone, &RowErrors)| {
+                let errors = errors.iter().enumerate();
+                let values = errors.filter_map(|(row, error)| {
+                    Some((row as f64 * self.period_s, error.as_ref()?[axis] * 1e6))
+                });
+                Mark::Band(tone, band(values, end_s, rows))
+            };
+            let all = before.map(|before| (Tone::Noise, before)).into_iter();
+            let all = all.chain([(Tone::Data, after)]).map(series);
+            (
+                PLANAR[axis],
+                std::iter::once(self.borders()).chain(all).collect(),
+            )
         };
-        self.over_time(caption, PLANAR, tones, |tone, row, axis| {
-            let errors = before.filter(|_| tone == Tone::Noise).unwrap_or(after);
-            Some((*errors.get(row)?)?[axis] * 1e6)
-        })
+        Chart::new(caption, ("time of the rows, s", Axis(0.0, end_s)), panel)
     }
 
     /// Mean of the errors and two of their standard deviations about it against pose, signals and temperatures, beside
@@ -141,36 +122,14 @@ impl Log<'_> {
                     noise_end(-1.0),
                     noise_end(1.0),
                 ];
-                Panel::new(PLANAR[axis], Scale::Symmetric, marks)
+                (PLANAR[axis], marks)
             };
             let caption = format!("Errors against {}", name.split(',').next().unwrap_or(name));
-            (high > low)
-                .then(|| Chart::with_three_panels(caption, (name, Axis::Linear(low, high)), panel))
+            (high > low).then(|| Chart::new(caption, (name, Axis(low, high)), panel))
         };
         (QUANTITIES.iter().chain(&TEMPERATURES))
             .filter_map(chart)
             .collect()
-    }
-
-    /// Amplitude spectral density of the errors beside the density of white noise (m, m, rad); `None` where no
-    /// movement is long enough.
-    pub(super) fn spectrum(&self, errors: &RowErrors, noise: [f64; 3]) -> Option<Chart> {
-        let Density { bin_hz, power } = Density::new(self.dataset, self.period_s, errors)?;
-        let highest_hz = 0.5 / self.period_s;
-        let panel = |axis: usize| {
-            let white = noise[axis] * 1e6 * (2.0 * self.period_s).sqrt();
-            let white = vec![(bin_hz, white), (highest_hz, white)];
-            let bins = power[axis].iter().enumerate().skip(1);
-            let bins = bins.map(|(bin, &power)| (bin as f64 * bin_hz, power * 1e12));
-            let data = Mark::Line(Tone::Data, thinned(bins));
-            let marks = vec![Mark::Line(Tone::Noise, white), data];
-            Panel::new(&format!("{}/√Hz", PLANAR[axis]), Scale::Logarithmic, marks)
-        };
-        Some(Chart::with_three_panels(
-            "Amplitude spectral density of the errors and of white noise",
-            ("frequency, Hz", Axis::Logarithmic(bin_hz, highest_hz)),
-            panel,
-        ))
     }
 }
 
@@ -209,38 +168,5 @@ impl Density {
             bin_hz: 1.0 / (length as f64 * period_s),
             power: [0, 1, 2].map(of_axis),
         })
-    }
-}
-
-/// The root of the mean power of the points that stand together on a logarithmic axis, at their middle.
-fn thinned(powers: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    let place = |x: f64| (x.log10() * POINTS / 4.0).floor();
-    let points: Vec<(f64, f64)> = powers.collect();
-    let groups = points.chunk_by(|a, b| place(a.0) == place(b.0));
-    let mean = |group: &[(f64, f64)]| {
-        let n = group.len() as f64;
-        let sum = |of: fn(&(f64, f64)) -> f64| group.iter().map(of).sum::<f64>();
-        (sum(|point| point.0) / n, (sum(|point| point.1) / n).sqrt())
-    };
-    groups.map(mean).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thinned_spectrum_keeps_its_level_and_shows_its_lines() {
-        let points = |line: f64| {
-            (1..4096).map(move |k| (f64::from(k), if k == 3000 { line * line } else { 1.0 }))
-        };
-        let flat = thinned(points(1.0));
-        assert!(flat.len() < POINTS as usize && flat.iter().all(|(_, y)| (y - 1.0).abs() < 1e-12));
-        let line = thinned(points(90.0));
-        let (x, y) = line
-            .into_iter()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("points");
-        assert!((x - 3000.0).abs() < 30.0 && y > 5.0, "{x} {y}");
     }
 }

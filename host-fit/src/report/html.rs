@@ -77,12 +77,13 @@ pub struct Section {
     pub charts: Vec<Chart>,
 }
 
-/// Renders a template; it may include the templates of verdict, findings and cells.
+/// Renders a template; it may include the templates of verdict, findings, cells and charts.
 fn rendered(name: &str, template: &str, of: &impl Serialize) -> Result<String, Error> {
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
     engine.add_global("style", include_str!("style.css"));
     engine.add_template("cells.html", include_str!("cells.html"))?;
+    engine.add_template("chart.html", include_str!("chart.html"))?;
     engine.add_template("verdict.html", include_str!("verdict.html"))?;
     engine.add_template("findings.html", include_str!("findings.html"))?;
     engine.render_named_str(name, template, Serde(of))

@@ -183,16 +183,14 @@ impl Source<'_> {
                 log.errors("After, enlarged", &report.by_row, None),
             ],
         };
-        let mut against = log.against(&report.by_row, noise);
-        against.extend(log.spectrum(&report.by_row, noise));
         let residuals = Section {
-            title: "Errors against pose, signals and frequency",
+            title: "Errors against pose and signals",
             notes: vec![
                 "Line: mean of the errors. Band: two standard deviations of the errors. Orange lines: two standard deviations \
                  of the noise from row to row. Where the mean leaves zero over a long way, the model lacks something."
                     .to_owned(),
             ],
-            charts: against,
+            charts: log.against(&report.by_row, noise),
             ..Section::default()
         };
         let designed = [("designed", parameters::designed(self.stage))];
