@@ -14,6 +14,7 @@ use host_fit::input::text::TextReader;
 use host_fit::output::write_atomically;
 use host_fit::report::plan::{figures, tables};
 use host_fit::report::text::as_text;
+use host_fit::simulate::dynamics::Dynamics;
 use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::plan_file;
 use host_fit::simulate::pose::StagePose;
@@ -102,7 +103,7 @@ pub struct SimulatedLog {
 /// Records a run of a simulated stage: magnets and their fields, rigid motion, noise, drift, converters. The
 /// simulation uses none of the models that are fitted.
 ///
-/// `run`: a `Plan`; "paper", "combined", "service" or "day", the protocols of the program; or poses, (n, 6), X, Y, Rz,
+/// `run`: a `Plan`; "paper", "combined", "service", "day" or "fast", the protocols of the program; or poses, (n, 6), X, Y, Rz,
 /// Z, Rx, Ry in m and rad, one for each servo period. `seed`: stage and noise; an even seed has magnets
 /// as designed, an odd seed imperfect magnets. `hour`: begins the run at this hour of a working day, -24 to 24
 /// (work begins at 0); the log then has the temperature columns of `[temperature]` in the stage file. `host-fit
@@ -124,7 +125,7 @@ pub fn simulate<'py>(
         return Err(wrong("hour", "-24 to 24 h of the day are possible"));
     }
     let recorded = work::run(py, || {
-        let recording = record_stage(&designed, run, hour, seed)?;
+        let recording = record_stage(&designed, run, hour, Dynamics::NONE, seed)?;
         let csv = log_csv(&recording, &designed);
         let name = Path::new("simulated");
         let reading = log::read_bytes(csv.as_bytes(), name, &designed, &ReadOptions::FIT);

@@ -9,6 +9,7 @@
 //! | [`pose`] | position and orientation of a rigid stage |
 //! | [`probe`] | a Hall probe over its magnet: from pose to signal |
 //! | [`assembly`] | a stage with drawn tolerances |
+//! | [`dynamics`] | probes that are late, stray fields of coils, arms that bend |
 //! | [`protocol`], [`plan_file`] | its motion |
 //! | [`sensors`] | noise, drift, resets, converters, beams |
 //! | [`thermal`] | the effect of temperature on its parts, a working day |
@@ -19,7 +20,7 @@
 //! A seed is a stage: all protocols and plans with one seed run on the same stage, each with its own
 //! noise. The same seed gives the same bytes on every machine.
 //!
-//! Vibration, lag between the sensors and the errors of the servo are not simulated.
+//! Vibration and the errors of the servo are not simulated.
 //!
 //! ```
 //! # use hallstage_input::shipped::STAGE_TOML;
@@ -38,6 +39,7 @@
 #![forbid(unsafe_code)]
 
 pub mod assembly;
+pub mod dynamics;
 pub mod log_text;
 pub mod magnet;
 pub mod plan_file;

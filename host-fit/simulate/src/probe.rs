@@ -7,12 +7,16 @@
 //! When the stage tilts, the probe also senses some of the flux along u, as if the probe were
 //! [`TILT_LEVER_M`] lower.
 
+use super::dynamics::Moving;
 use super::magnet::Cuboid;
 use super::pose::StagePose;
 use nalgebra::{Matrix3, Vector3};
 
 /// Half the edges of the designed magnet, 12.7 x 6.4 x 6.4 mm (section 2 of the paper), m.
 pub const MAGNET_HALF_M: Vector3<f64> = Vector3::new(6.35e-3, 3.2e-3, 3.2e-3);
+
+/// Remanence of the designed magnet, T.
+pub const REMANENCE_T: f64 = 1.3;
 
 /// Distance of the designed probe from the magnet's upper face, m. The paper does not state it. With
 /// 4.0 mm the slope falls with height as in the given logs, by 215 to 237 per m at sensitivities of 0.93
@@ -78,7 +82,7 @@ impl HallProbe {
         let slope_per_m = slope_per_m(self.at_rest_m.z - MAGNET_HALF_M.z);
         // Newton's steps with a slope that is right to a few per cent.
         for _ in 0..8 {
-            self.at_rest_m.x -= self.flux(&StagePose::default()) / slope_per_m;
+            self.at_rest_m.x -= self.flux_at_rest() / slope_per_m;
         }
     }
 
@@ -86,30 +90,41 @@ impl HallProbe {
     pub fn trimmed(self) -> TrimmedProbe {
         TrimmedProbe {
             probe: self,
-            rest_flux: self.flux(&StagePose::default()),
+            rest_flux: self.flux_at_rest(),
             flux_per_m: slope_per_m(DESIGNED_GAP_M),
             element: [1.0, 0.0],
         }
     }
 
-    fn in_mount_m(&self, pose: &StagePose) -> Vector3<f64> {
+    fn in_mount_m(&self, Moving { pose, bend_m, .. }: &Moving) -> Vector3<f64> {
         let moved = pose.rotation() * self.position_m - self.position_m + pose.position_m();
-        self.at_rest_m + self.mount.tr_mul(&moved)
+        self.at_rest_m + self.mount.tr_mul(&(moved + bend_m))
     }
 
     /// Flux density that the probe senses, in units of the designed magnet's remanence.
-    fn flux(&self, pose: &StagePose) -> f64 {
-        let field = self.magnet.field(self.seat.tr_mul(&self.in_mount_m(pose)));
-        let axis = pose.rotation() * self.axis;
-        axis.dot(&(self.mount * (self.seat * field)))
+    fn flux(&self, moving: &Moving) -> f64 {
+        let field = self
+            .magnet
+            .field(self.seat.tr_mul(&self.in_mount_m(moving)));
+        let axis = moving.pose.rotation() * self.axis;
+        axis.dot(&(self.mount * (self.seat * field) + moving.stray))
+    }
+
+    fn flux_at_rest(&self) -> f64 {
+        self.flux(&Moving::at(&StagePose::default()))
     }
 }
 
 impl TrimmedProbe {
     /// The signal at a pose, at the designed scale, m.
     pub fn signal_m(&self, pose: &StagePose) -> f64 {
+        self.moving_signal_m(&Moving::at(pose))
+    }
+
+    /// The signal of the moving probe, at the designed scale, m.
+    pub fn moving_signal_m(&self, moving: &Moving) -> f64 {
         let [gain, offset] = self.element;
-        let flux = gain * self.probe.flux(pose) + offset;
+        let flux = gain * self.probe.flux(moving) + offset;
         let s = (flux - self.rest_flux) / self.flux_per_m;
         let [k2, k3] = self.probe.curvature;
         s * (1.0 + s * (k2 + s * k3))
@@ -141,13 +156,18 @@ impl TrimmedProbe {
     pub fn reseated(mut self, moved_m: Vector3<f64>) -> Self {
         self.probe.at_rest_m += moved_m;
         self.probe.position_m += self.probe.mount * moved_m;
-        self.rest_flux = self.probe.flux(&StagePose::default());
+        self.rest_flux = self.probe.flux_at_rest();
         self
+    }
+
+    /// Place of the probe on the stage, m.
+    pub const fn place_m(&self) -> Vector3<f64> {
+        self.probe.position_m
     }
 
     /// Whether the probe is free of its magnet at a pose.
     pub fn is_clear(&self, pose: &StagePose) -> bool {
-        self.probe.in_mount_m(pose).z > self.probe.magnet.half_m.z
+        self.probe.in_mount_m(&Moving::at(pose)).z > self.probe.magnet.half_m.z
     }
 }
 
@@ -256,7 +276,7 @@ mod tests {
         probe.axis = Vector3::new(0.02, 0.03, 1.0).normalize();
         probe.magnet.remanence = Vector3::new(1.0, 0.02, -0.03);
         let slope_per_m = slope_per_m(DESIGNED_GAP_M);
-        let rest = |probe: &HallProbe| probe.flux(&StagePose::default()) / slope_per_m;
+        let rest = |probe: &HallProbe| probe.flux_at_rest() / slope_per_m;
         assert!(rest(&probe).abs() > 1e-4, "{}", rest(&probe));
         probe.centre();
         assert!(rest(&probe).abs() < 1e-12, "{}", rest(&probe));

@@ -40,6 +40,8 @@ pub enum Protocol {
     /// A working day in 37 pieces, one every quarter of an hour: 0.4 s at rest for a re-zero, then 1 s of
     /// the combined motion.
     Day,
+    /// Moves of 60 ms between random poses, up to 1.4 m/s2 along Y, with an exact zero of the interferometers.
+    Fast,
 }
 
 /// One movement: the pose of every servo period between two resets of the interferometers.
@@ -68,6 +70,8 @@ const COMBINED_AMPLITUDES: [[f64; 3]; 2] = [[250e-6, 400e-6, 250e-6], [120e-6, 2
 const COMBINED_HZ: [f64; 2] = [0.3, 2.0];
 const COMBINED_MOVEMENTS: usize = 8;
 const COMBINED_S: f64 = 8.0;
+/// Time of a move of the fast motion and of the rest after it, s.
+const FAST_S: [f64; 2] = [0.06, 0.02];
 const DAY_MOVEMENTS: usize = 37;
 const DAY_SPACING_S: f64 = 900.0;
 /// Time at rest and of motion of a piece of the day, s.
@@ -89,6 +93,11 @@ impl Protocol {
                 let movement = |_| combined(servo_period_s, COMBINED_S, &mut random);
                 (0..COMBINED_MOVEMENTS).map(movement).collect()
             }
+            Self::Fast => {
+                let mut random = Stream::new(seed, Purpose::Motion, number);
+                let movement = |_| fast(servo_period_s, COMBINED_S, &mut random);
+                (0..COMBINED_MOVEMENTS).map(movement).collect()
+            }
             Self::Day => {
                 let mut random = Stream::new(seed, Purpose::Motion, number);
                 let [rest_s, motion_s] = DAY_PIECE_S;
@@ -102,7 +111,7 @@ impl Protocol {
         };
         Run {
             movements,
-            is_zero_exact: self == Self::Service,
+            is_zero_exact: matches!(self, Self::Service | Self::Fast),
             spacing_s: (self == Self::Day).then_some(DAY_SPACING_S),
             number,
         }
@@ -176,6 +185,29 @@ fn combined(servo_period_s: f64, length_s: f64, random: &mut Stream) -> Trajecto
     })
 }
 
+/// Moves from pose to pose within the combined amplitudes, from the initial pose. The acceleration of a move
+/// is one period of a sine.
+fn fast(servo_period_s: f64, length_s: f64, random: &mut Stream) -> Trajectory {
+    let [move_s, rest_s] = FAST_S;
+    let each_s = move_s + rest_s;
+    let amplitudes = COMBINED_AMPLITUDES.as_flattened();
+    let mut pose = |k| {
+        let to = |axis: usize| amplitudes[axis] * random.between(-1.0, 1.0);
+        let drawn: [f64; 6] = std::array::from_fn(to);
+        if k == 0 { [0.0; 6] } else { drawn }
+    };
+    let poses: Vec<[f64; 6]> = (0..=(length_s / each_s) as usize + 1)
+        .map(&mut pose)
+        .collect();
+    trajectory(servo_period_s, length_s, |t| {
+        let k = (t / each_s) as usize;
+        let x = ((t - k as f64 * each_s) / move_s).min(1.0);
+        let part = x - libm::sin(TAU * x) / TAU;
+        let at = |axis: usize| poses[k][axis] + part * (poses[k + 1][axis] - poses[k][axis]);
+        StagePose::from_array(std::array::from_fn(at))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -212,6 +244,25 @@ mod tests {
                     assert!((span / amplitude - 2.0).abs() < 1e-3, "{span}");
                 }
             }
+        }
+    }
+
+    /// The longest move of Y: 0.8 mm in 60 ms, 2 pi d / T^2.
+    #[test]
+    fn fast_moves_reach_four_times_their_rms_acceleration() {
+        const PERIOD_S: f64 = 0.002;
+        for poses in Protocol::Fast.run(PERIOD_S, 1).movements {
+            assert_eq!((poses.len(), poses[0]), (4000, StagePose::default()));
+            let (mut peak, mut square) = (0.0f64, 0.0);
+            for three in poses.windows(3) {
+                let [a, b, c] = [0, 1, 2].map(|k| three[k].planar[1]);
+                let acceleration = (c - 2.0 * b + a) / (PERIOD_S * PERIOD_S);
+                peak = peak.max(acceleration.abs());
+                square += acceleration * acceleration / (poses.len() - 2) as f64;
+            }
+            assert!((1.0..1.4).contains(&peak), "{peak}");
+            let ratio = peak / square.sqrt();
+            assert!((3.0..4.5).contains(&ratio), "{ratio}");
         }
     }
 }

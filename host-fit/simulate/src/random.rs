@@ -17,6 +17,8 @@ pub enum Purpose {
     Sensors = 3,
     /// The temperature coefficients of the parts, and the errors of the temperature sensors.
     Thermal = 4,
+    /// The coils and arms of a stage.
+    Dynamics = 5,
 }
 
 /// A stream of random numbers.

@@ -1,6 +1,7 @@
 //! The recording of a run of a simulated stage: codes, beams and the truth.
 
 use super::assembly::Assembly;
+use super::dynamics::{Dynamics, Motion, Moving};
 use super::pose::StagePose;
 use super::protocol::Run;
 use super::random::{Purpose, Stream};
@@ -68,7 +69,7 @@ pub struct Recording {
     pub truth: Vec<Vec<StagePose>>,
 }
 
-/// Runs the stage of a seed with the usual errors of the sensors. With `hour` the run begins at this hour of
+/// Runs the stage of a seed with the usual errors of the sensors and these effects of motion. With `hour` the run begins at this hour of
 /// a working day and records temperatures; [`super::protocol::Protocol::Day`] always does, by default from
 /// hour 0.
 ///
@@ -78,9 +79,14 @@ pub fn record_stage(
     stage: &Stage,
     run: Run,
     hour: Option<f64>,
+    dynamics: Dynamics,
     seed: u64,
 ) -> Result<Recording, RecordError> {
-    let (assembly, errors) = (Assembly::draw(stage, seed), &SensorErrors::USUAL);
+    let assembly = Assembly::draw(stage, seed);
+    let errors = &SensorErrors {
+        dynamics,
+        ..SensorErrors::USUAL
+    };
     match hour.or_else(|| run.spacing_s.map(|_| 0.0)) {
         None => record(stage, &assembly, run, errors, seed),
         Some(_) if stage.temperature.columns == [None, None] => Err(RecordError::NoTemperature),
@@ -140,6 +146,8 @@ fn record_with(
         let mut reference = ReferenceError::reset(errors, run.is_zero_exact, period_s, &mut random);
         let mut samples = Vec::with_capacity(poses.len());
         let mut warmed = *assembly;
+        let dynamics = (errors.dynamics != Dynamics::NONE).then_some(&errors.dynamics);
+        let mut motions = dynamics.map(|d| [0, 1, 2].map(|probe| Motion::new(d, probe, period_s)));
         let mut temperature_mc = [MISSING_CODE; 2];
         for (k, pose) in poses.iter().enumerate() {
             let t_us = (k as f64 * period_s * 1e6).round() as i64;
@@ -156,6 +164,13 @@ fn record_with(
                     t_us,
                 });
             }
+            let mut moving = [Moving::at(pose); 3];
+            if let Some(motions) = &mut motions {
+                for ((moving, motion), probe) in moving.iter_mut().zip(motions).zip(&warmed.probes)
+                {
+                    *moving = motion.next(poses, k, probe.place_m());
+                }
+            }
             let error = reference.next(&mut random);
             let planar = core::array::from_fn(|i| pose.planar[i] + error[i]);
             let mut noisy = |value: f64, deviation: f64| value + random.normal(deviation);
@@ -165,8 +180,10 @@ fn record_with(
                     .map(|beam| (noisy(beam, errors.beam_m) * 1e9).round() as i64),
                 capacitive: gaps_m(stage, pose)
                     .map(|gap| code(noisy(gap, errors.gap_m), &stage.capacitive)),
-                hall: (warmed.probes)
-                    .map(|probe| code(noisy(probe.signal_m(pose), errors.hall_m), &stage.hall)),
+                hall: [0, 1, 2].map(|probe| {
+                    let signal_m = warmed.probes[probe].moving_signal_m(&moving[probe]);
+                    code(noisy(signal_m, errors.hall_m), &stage.hall)
+                }),
                 temperature_mc,
             });
         }

@@ -15,7 +15,7 @@
 //! wave of temperature.
 
 use super::assembly::Assembly;
-use super::probe::ThermalChange;
+use super::probe::{REMANENCE_T, ThermalChange};
 use super::random::{Purpose, Stream};
 use std::f64::consts::TAU;
 
@@ -24,8 +24,6 @@ pub const ASSEMBLED_C: f64 = 20.0;
 /// How long a converter holds a temperature, s.
 pub const HELD_S: f64 = 0.1;
 
-/// Remanence for the offsets of the Hall elements, T.
-const REMANENCE_T: f64 = 1.3;
 const REMANENCE_PER_K: f64 = -1.1e-3;
 const REMANENCE_SCATTER_PER_K: f64 = 5e-5;
 const HALL_GAIN_PER_K: f64 = 1e-4;

@@ -53,6 +53,7 @@ values! {
         Combined: "combined", "All six axes at once, 8 movements of 8 s";
         Service: "service", "As combined, other trajectories, interferometers zeroed truly";
         Day: "day", "A working day: 37 pieces of service, one each quarter of an hour, each after 0.4 s at rest";
+        Fast: "fast", "Moves of 60 ms between random poses, up to 1.4 m/s2, interferometers zeroed truly";
     }
     BadRows {
         Refuse: "refuse", "Stop at the first and say where it is";

@@ -8,6 +8,7 @@ use crate::output::Outputs;
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
 use hallstage_simulate::assembly::Magnets;
+use hallstage_simulate::dynamics::Dynamics;
 use hallstage_simulate::log_text::{log_csv, truth_csv};
 use hallstage_simulate::plan_file;
 use hallstage_simulate::protocol::{Protocol, Run};
@@ -31,6 +32,15 @@ pub(super) struct SimulateArgs {
     /// has the temperature columns that the stage file names.
     #[arg(long, value_name = "H", value_parser = hour, allow_negative_numbers = true)]
     hour: Option<f64>,
+    /// Read the probes A, B, C this late, us; negative: early. All three with commas between them.
+    #[arg(long, value_name = "A,B,C", value_parser = lag_us, value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    probe_lag_us: Vec<f64>,
+    /// Put motor coils at this distance from each probe, cm; their stray field follows the acceleration.
+    #[arg(long, value_name = "CM", value_parser = coil_cm)]
+    coil_cm: Option<f64>,
+    /// Put the probes on arms with a resonance at about this frequency, Hz.
+    #[arg(long, value_name = "HZ", value_parser = arm_hz)]
+    arm_hz: Option<f64>,
     /// Stage and noise. An even seed has magnets as designed, an odd seed imperfect magnets.
     #[arg(long, value_name = "N")]
     seed: u64,
@@ -44,6 +54,18 @@ pub(super) struct SimulateArgs {
 
 fn hour(text: &str) -> Result<f64, String> {
     between(text, -24.0, 24.0, "an hour of the day")
+}
+
+fn lag_us(text: &str) -> Result<f64, String> {
+    between(text, -5000.0, 5000.0, "a lag")
+}
+
+fn coil_cm(text: &str) -> Result<f64, String> {
+    between(text, 3.0, 100.0, "a distance")
+}
+
+fn arm_hz(text: &str) -> Result<f64, String> {
+    between(text, 20.0, 1e4, "a resonance")
 }
 
 /// Writes the log of a simulated stage.
@@ -66,7 +88,17 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
             return Err(HostError::usage("--protocol", problem));
         }
     };
-    let recording = record_stage(&stage, run, args.hour, args.seed)?;
+    let lag_us = match args.probe_lag_us[..] {
+        [] => [0.0; 3],
+        [a, b, c] => [a, b, c],
+        _ => {
+            let problem = "three lags are needed, of the probes A, B and C";
+            return Err(HostError::usage("--probe-lag-us", problem));
+        }
+    };
+    let coil_m = args.coil_cm.map(|cm| cm * 1e-2);
+    let dynamics = Dynamics::draw(lag_us.map(|us| us * 1e-6), coil_m, args.arm_hz, args.seed);
+    let recording = record_stage(&stage, run, args.hour, dynamics, args.seed)?;
     let mut outputs = Outputs::default();
     if let Some(path) = truth {
         outputs.add(path, &bytes(path, truth_csv(&recording))?)?;

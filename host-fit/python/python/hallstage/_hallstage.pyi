@@ -57,7 +57,7 @@ def read_log(
 def plan(stage: Stage, *, seconds: float = 20.0) -> Plan: ...
 def simulate(
     stage: Stage,
-    run: Plan | Literal["paper", "combined", "service", "day"] | ArrayLike,
+    run: Plan | Literal["paper", "combined", "service", "day", "fast"] | ArrayLike,
     *,
     seed: int = 1,
     hour: float | None = None,
