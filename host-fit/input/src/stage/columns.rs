@@ -13,12 +13,10 @@
 //! ignore = ["temperature", "operator"]             # columns to leave out
 //! ```
 
-use super::document::Document;
+use super::document::{Document, Value};
 use super::error::StageError;
 use crate::log::layout::{Column, LogLayout, Quantity, UnitFault};
 use crate::log::units;
-use std::ops::Range;
-use toml::Spanned;
 
 /// Smallest and largest magnitude of a scale given by the user, in SI units per unit.
 const SCALE_MAGNITUDES: (f64, f64) = (1e-15, 1e9);
@@ -34,47 +32,49 @@ pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageErro
     let mut layout = LogLayout::default();
     layout.hall_volts_per_count = volts("hall")?;
     layout.capacitive_volts_per_count = volts("capacitive")?;
-    let mut mapped: Vec<(Quantity, Range<usize>)> = Vec::new();
+    let mut mapped: Vec<(Quantity, Value<'_>)> = Vec::new();
     for quantity in Quantity::ALL {
-        if let Some((span, column)) = column(document, &layout, quantity)? {
+        if let Some((value, column)) = column(document, &layout, quantity)? {
             layout.set(quantity, column);
-            mapped.push((quantity, span));
+            mapped.push((quantity, value));
         }
     }
-    let twice = |span: &Range<usize>, column: &str, other: Quantity| {
+    let twice = |value: &Value<'_>, column: &str, other: Quantity| {
         let other = other.key();
         let problem = format!(
             "the column \"{column}\" is named twice (also by `{other}`); give each column one use"
         );
-        document.refuse(span.clone(), problem)
+        document.refuse(value, problem)
     };
     // Two keys for one column: at least one of them was mapped here, the other may be a default.
-    for (quantity, span) in &mapped {
+    for (quantity, value) in &mapped {
         let name = &layout.column(*quantity).name;
         let mut others = Quantity::ALL.into_iter().filter(|other| other != quantity);
         if let Some(other) = others.find(|other| layout.column(*other).name == *name) {
-            return Err(twice(span, name, other));
+            return Err(twice(value, name, other));
         }
     }
-    let ignored: Vec<Spanned<String>> = document.read("log", "ignore")?.unwrap_or_default();
-    for item in &ignored {
-        let name = named(document, item)?;
+    let ignored = document.get("log", "ignore");
+    for item in ignored.iter().flat_map(Value::items) {
+        let name = named(document, &item)?;
         let used = mapped.iter().find(|(q, _)| layout.column(*q).name == name);
         if let Some((quantity, _)) = used {
-            return Err(twice(&item.span(), &name, *quantity));
+            return Err(twice(&item, &name, *quantity));
         }
         layout.ignored.push(name);
     }
     for key in ["mount", "body"] {
-        layout.ignored.extend(document.read("temperature", key)?);
+        let column = document.get("temperature", key);
+        let name = column.and_then(|column| Some(column.as_text()?.to_owned()));
+        layout.ignored.extend(name);
     }
     Ok(layout)
 }
 
-fn named(document: &Document<'_>, name: &Spanned<String>) -> Result<String, StageError> {
-    match name.get_ref().trim() {
+fn named(document: &Document<'_>, name: &Value<'_>) -> Result<String, StageError> {
+    match name.as_text().unwrap_or_default().trim() {
         "" => Err(document.refuse(
-            name.span(),
+            name,
             "the column name is empty; give the name that stands in the log's header",
         )),
         name => Ok(name.to_owned()),
@@ -82,29 +82,24 @@ fn named(document: &Document<'_>, name: &Spanned<String>) -> Result<String, Stag
 }
 
 /// The column that the table names for a quantity, if it does, and where the name stands.
-fn column(
-    document: &Document<'_>,
+fn column<'d>(
+    document: &'d Document<'_>,
     layout: &LogLayout,
     quantity: Quantity,
-) -> Result<Option<(Range<usize>, Column)>, StageError> {
+) -> Result<Option<(Value<'d>, Column)>, StageError> {
     let (key, kind) = (quantity.key(), quantity.kind());
     let table = format!("log.{key}");
-    let (column, unit, scale): (_, Option<Spanned<String>>, Option<Spanned<f64>>) =
-        if document.is_text("log", key)? {
-            (document.require("log", key)?, None, None)
-        } else if document.span("log", key).is_empty() {
-            return Ok(None);
-        } else {
-            (
-                document.require(&table, "column")?,
-                document.read(&table, "unit")?,
-                document.read(&table, "scale")?,
-            )
-        };
+    let column = match document.get("log", key) {
+        None => return Ok(None),
+        Some(name) if name.as_text().is_some() => name,
+        Some(_) => document.require(&table, "column")?,
+    };
+    let unit = document.get(&table, "unit");
+    let scale = document.get(&table, "scale");
     let name = named(document, &column)?;
     let known = kind.units();
     let si = kind.si();
-    let of_unit = |symbol: &str, span| {
+    let of_unit = |symbol: &str, value: &Value<'_>| {
         let problem = |fault| match fault {
             UnitFault::NoVoltsPerCount => format!(
                 "the column is a voltage; give the converter's `volts_per_count` (V) in [{}]",
@@ -118,33 +113,37 @@ fn column(
             }
         };
         let scale = layout.scale(quantity, symbol);
-        scale.map_err(|fault| document.refuse(span, problem(fault)))
+        scale.map_err(|fault| document.refuse(value, problem(fault)))
     };
     let scale = match (unit, scale) {
         (Some(_), Some(scale)) => {
             let problem = "`unit` and `scale` are both given; keep one of them";
-            return Err(document.refuse(scale.span(), problem));
+            return Err(document.refuse(&scale, problem));
         }
         (None, Some(scale)) => {
             let Some((unit, per_si)) = si else {
                 let problem = "this column holds numbers without a unit; give only its name";
-                return Err(document.refuse(scale.span(), problem));
+                return Err(document.refuse(&scale, problem));
             };
             let (low, high) = SCALE_MAGNITUDES;
-            let magnitude = Spanned::new(scale.span(), scale.get_ref().abs());
-            document.within(&magnitude, low, high, unit)?;
-            scale.into_inner() * per_si
+            let given = document.within(&scale, (-high, high), unit)?;
+            if given.abs() < low {
+                let problem =
+                    format!("{given} {unit} is outside {low:e} to {high:e} {unit}; check it");
+                return Err(document.refuse(&scale, problem));
+            }
+            given * per_si
         }
-        (Some(unit), None) => of_unit(unit.get_ref(), unit.span())?,
+        (Some(unit), None) => of_unit(unit.as_text().unwrap_or_default(), &unit)?,
         (None, None) if kind.unit_in_name(&name).is_some() => {
-            of_unit(units::split(&name).1.unwrap_or(&name), column.span())?
+            of_unit(units::split(&name).1.unwrap_or(&name), &column)?
         }
         (None, None) if si.is_some() => {
             let example = format!("{{ column = \"{name}\", unit = \"...\" }}");
             let problem = format!("its unit is unknown; write {example} with one of {known}");
-            return Err(document.refuse(column.span(), problem));
+            return Err(document.refuse(&column, problem));
         }
         (None, None) => 1.0,
     };
-    Ok(Some((column.span(), Column { name, scale })))
+    Ok(Some((column, Column { name, scale })))
 }

@@ -1,9 +1,9 @@
 //! Reads `stage.toml` and checks every value of it.
 //!
-//! Each table is read key by key. A key that nobody asked for is refused. `direction_deg`, `volts_per_count` and the tables `[search]`, `[motion]`,
+//! The keys of the file and the kinds of their values are known to be right. `direction_deg`, `volts_per_count` and the tables `[search]`, `[motion]`,
 //! `[temperature]` and `[log]` are optional, key by key.
 
-use super::document::{Document, List};
+use super::document::{Document, Value};
 use super::error::StageError;
 use super::{CodeScale, Probe, Stage, columns, motion, paper_signs, search, temperature};
 use crate::source;
@@ -14,12 +14,12 @@ use runtime::geometry::ProbeGeometry;
 use runtime::matrix::inverse_and_determinant;
 use std::f64::consts::TAU;
 use std::path::Path;
-use toml::Spanned;
 
 /// Largest stage file that is read: a sound one has a few thousand bytes.
 const BYTES_MAX: u64 = 1 << 20;
 /// Largest distance of a probe from the stage's centre, m: stages of this kind are decimetres.
 pub(super) const COORDINATE_MAX_M: f64 = 10.0;
+const COORDINATES_M: (f64, f64) = (-COORDINATE_MAX_M, COORDINATE_MAX_M);
 /// Full scales of a converter that make sense, m.
 const FULL_SCALES_M: (f64, f64) = (1e-6, 0.1);
 /// Distances between the two Y beams that make sense, m.
@@ -58,9 +58,6 @@ impl Stage {
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, StageError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let document = &Document::parse(text, path)?;
-        let number = |table, key, (low, high), unit| {
-            document.within(&document.require(table, key)?, low, high, unit)
-        };
         let probes = designed_probes(document)?;
         let capacitive = code_scale(document, "capacitive")?;
         let stage = Self {
@@ -68,43 +65,37 @@ impl Stage {
             hall: code_scale(document, "hall")?,
             capacitive_probes_m: capacitive_probes(document, &capacitive)?,
             capacitive,
-            y_baseline_m: number("interferometer", "y_baseline_m", BASELINES_M, "m")?,
+            y_baseline_m: document.required("interferometer", "y_baseline_m", BASELINES_M, "m")?,
             reset_sd: reset_sd(document)?,
-            servo_period_s: number("servo", "period_s", PERIODS_S, "s")?,
+            servo_period_s: document.required("servo", "period_s", PERIODS_S, "s")?,
             search: search::ranges(document, &probes)?,
             motion: motion::motion(document)?,
             temperature: temperature::temperature(document)?,
             log: columns::log_layout(document)?,
         };
-        document.refuse_unknown()?;
         Ok(stage)
     }
 }
 
 fn designed_probes(document: &Document<'_>) -> Result<[Probe; 3], StageError> {
-    let at = |key| {
-        let value = document.require("hall", key)?;
-        document.within(&value, -COORDINATE_MAX_M, COORDINATE_MAX_M, "m")
-    };
+    let at = |key| document.required("hall", key, COORDINATES_M, "m");
     let places_m = paper_signs([
         [at("h1x_m")?, at("h1y_m")?],
         [at("h2x_m")?, at("h2y_m")?],
         [at("h3x_m")?, at("h3y_m")?],
     ]);
     let mut theta_rad = [0.0; 3];
-    let directions: Option<List<Spanned<f64>>> = document.read("hall", "direction_deg")?;
-    if let Some(directions) = &directions {
-        let directions: &[_; 3] = document.exactly(directions)?;
-        for (k, (theta, direction)) in theta_rad.iter_mut().zip(directions).enumerate() {
-            let direction = document.within(direction, -360.0, 360.0, "degrees")?;
-            *theta = (direction - STANDARD_DEG[k]).to_radians();
-        }
+    let directions = document.get("hall", "direction_deg");
+    let directions = directions.iter().flat_map(Value::items).enumerate();
+    for (k, direction) in directions {
+        let direction = document.within(&direction, (-360.0, 360.0), "degrees")?;
+        theta_rad[k] = (direction - STANDARD_DEG[k]).to_radians();
     }
     let plane = ProbeGeometry::from_places(places_m, theta_rad).plane();
     if inverse_and_determinant(&plane).1.abs() < SPACING_MIN_M {
         let problem = "the probes cannot tell X, Y and Rz apart: A (+h1x_m) and B (-h2x_m) stand at \
                        the same x, or two probes sense the same motion; correct place or direction";
-        return Err(document.refuse(document.span("hall", "h2x_m"), problem));
+        return Err(document.refuse(&document.require("hall", "h2x_m")?, problem));
     }
     Ok([0, 1, 2].map(|k| Probe {
         place_m: places_m[k],
@@ -116,45 +107,40 @@ fn designed_probes(document: &Document<'_>) -> Result<[Probe; 3], StageError> {
 fn reset_sd(document: &Document<'_>) -> Result<Option<[f64; 3]>, StageError> {
     const TABLE: &str = "interferometer.reset_sd";
     let keys = ["x_m", "y_m", "rz_rad"];
-    let mut given = [None; 3];
-    for (given, key) in given.iter_mut().zip(keys) {
-        *given = document.read::<f64>(TABLE, key)?;
-    }
-    if given == [None; 3] {
+    if keys.iter().all(|key| document.get(TABLE, key).is_none()) {
         return Ok(None);
     }
     let mut out = [0.0; 3];
     for (out, key) in out.iter_mut().zip(keys) {
-        let (low, high) = RESETS;
         let unit = key.rsplit('_').next().unwrap_or_default();
-        *out = document.within(&document.require(TABLE, key)?, low, high, unit)?;
+        *out = document.required(TABLE, key, RESETS, unit)?;
     }
     Ok(Some(out))
 }
 
 fn code_scale(document: &Document<'_>, table: &str) -> Result<CodeScale, StageError> {
-    let m_per_count: Spanned<f64> = document.require(table, "m_per_count")?;
+    let m_per_count = document.require(table, "m_per_count")?;
     let code = |key| {
-        let value: Spanned<i64> = document.require(table, key)?;
-        let code = i32::try_from(*value.get_ref()).ok();
+        let value = document.require(table, key)?;
+        let number: i64 = document.read(&value)?;
+        let code = i32::try_from(number).ok();
         let inside = code.filter(|code| code.unsigned_abs() <= CODE_MAGNITUDE_MAX.unsigned_abs());
         let problem = format!(
-            "{} is beyond 24 bits; codes of up to {CODE_MAGNITUDE_MAX} are decoded exactly, so \
-             scale the converter's codes down",
-            value.get_ref()
+            "{number} is beyond 24 bits; codes of up to {CODE_MAGNITUDE_MAX} are decoded exactly, so \
+             scale the converter's codes down"
         );
-        inside.ok_or_else(|| document.refuse(value.span(), problem))
+        inside.ok_or_else(|| document.refuse(&value, problem))
     };
     let (low, high) = (code("code_min")?, code("code_max")?);
+    let most = document.require(table, "code_max")?;
     let window = CodeWindow::between_rails(low, high).ok_or_else(|| {
         let problem = format!(
             "no code lies between code_min = {low} and code_max = {high}; give the converter's \
              smallest and largest code"
         );
-        let span = document.span(table, "code_max");
-        document.refuse(span, problem)
+        document.refuse(&most, problem)
     })?;
-    let scale = document.within(&m_per_count, f64::MIN, f64::MAX, "m per code")?;
+    let scale = document.within(&m_per_count, (f64::MIN, f64::MAX), "m per code")?;
     let full_scale_m = scale * f64::from(window.low.abs().max(window.high.abs()));
     let (least, most) = FULL_SCALES_M;
     if !(least..=most).contains(&full_scale_m) {
@@ -162,7 +148,7 @@ fn code_scale(document: &Document<'_>, table: &str) -> Result<CodeScale, StageEr
             "{scale:e} m per code makes a full scale of {full_scale_m:e} m, outside {least:e} to \
              {most:e} m; check the scale and its unit (m per code)"
         );
-        return Err(document.refuse(m_per_count.span(), problem));
+        return Err(document.refuse(&m_per_count, problem));
     }
     Ok(CodeScale {
         m_per_count: scale,
@@ -174,14 +160,11 @@ fn capacitive_probes(
     document: &Document<'_>,
     scale: &CodeScale,
 ) -> Result<ProbePositions<f64>, StageError> {
-    let list: List<List<Spanned<f64>>> = document.require("capacitive", "probes_m")?;
-    let pairs: &[_; 3] = document.exactly(&list)?;
+    let list = document.require("capacitive", "probes_m")?;
     let mut probes = [[0.0; 2]; 3];
-    for (probe, pair) in probes.iter_mut().zip(pairs) {
-        let pair: &[_; 2] = document.exactly(pair)?;
-        for (at, value) in probe.iter_mut().zip(pair) {
-            *at = document.within(value, -COORDINATE_MAX_M, COORDINATE_MAX_M, "m")?;
-        }
+    let numbers = list.items().into_iter().flat_map(|pair| pair.items());
+    for (at, value) in probes.as_flattened_mut().iter_mut().zip(numbers) {
+        *at = document.within(&value, COORDINATES_M, "m")?;
     }
     let [p, q, r] = probes;
     let side = |a: [f64; 2], b: [f64; 2]| [b[0] - a[0], b[1] - a[1]];
@@ -191,7 +174,7 @@ fn capacitive_probes(
     if twice_area <= TRIANGLE_MIN * squares.into_iter().fold(0.0, f64::max) {
         let problem = "the three sensors stand in one line and define no plane; give the (x, y) of \
                        three sensors in a triangle";
-        return Err(document.refuse(list.span(), problem));
+        return Err(document.refuse(&list, problem));
     }
     let code = scale.window.low.abs().max(scale.window.high.abs());
     let full_scale_m = scale.m_per_count * f64::from(code);
@@ -204,7 +187,7 @@ fn capacitive_probes(
              of {largest_rad:.3e} rad, and rotations are to be small; check the places (m) and \
              m_per_count"
         );
-        return Err(document.refuse(list.span(), problem));
+        return Err(document.refuse(&list, problem));
     }
     Ok(probes)
 }

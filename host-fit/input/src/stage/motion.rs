@@ -137,7 +137,7 @@ mod tests {
     fn what_is_wrong_with_it_is_named_with_its_place() {
         #[rustfmt::skip]
         let cases = [
-            ("rotation = 3", 1, "rotation", "expected one of x, y, rz"),
+            ("rotation = 3", 1, "rotation", "expected one of rx, ry"),
             ("z = 3", 5, "z", ""),
             ("z = { amplitude_rad = 1e-4 }", 7, "z.amplitude_rad", "did you mean `amplitude_m`?"),
             ("rx = { speed_rad_per_s = \"fast\" }", 26, "rx.speed_rad_per_s", ""),

@@ -1,11 +1,10 @@
 //! The table `[search]`: the search ranges, which also bound the expected parameters of a fit.
 //! Every key is optional: the defaults follow from the design.
 
-use super::document::{Document, List};
+use super::document::{Document, Value};
 use super::error::StageError;
 use super::file::COORDINATE_MAX_M;
 use super::{Probe, Range, SearchRanges, paper_signs};
-use toml::Spanned;
 
 /// Largest sensible sensitivity: a probe that reads 100 times its designed scale is another probe.
 const ETA_MAX: f64 = 100.0;
@@ -29,9 +28,6 @@ const FALL_PER_M: Range = Range::new(-5000.0, 0.0);
 /// Usual zero deviation at most, m.
 const DELTA_M: f64 = 1e-4;
 
-/// [low, high] of the file.
-type Ends = List<Spanned<f64>>;
-
 /// The ranges of the table, which must hold the designed coordinates. A key that it leaves out has
 /// its default.
 pub(super) fn ranges(
@@ -39,7 +35,7 @@ pub(super) fn ranges(
     designed: &[Probe; 3],
 ) -> Result<SearchRanges, StageError> {
     let one = |name, most, unit, designed, default| -> Result<Range, StageError> {
-        let ends: Option<Ends> = document.read("search", name)?;
+        let ends = document.get("search", name);
         ends.map_or(Ok(default), |ends| {
             range(document, &ends, most, unit, designed)
         })
@@ -60,14 +56,13 @@ pub(super) fn ranges(
     let theta = Range::new(theta.low * DEGREE, theta.high * DEGREE);
     ranges.set("theta_deg", [theta; 3]);
     let three = |key, unit, default: [Range; 3]| -> Result<[Range; 3], StageError> {
-        let Some(list) = document.read::<List<Ends>>("search", key)? else {
-            return Ok(default);
-        };
-        let list: &[_; 3] = document.exactly(&list)?;
-        let [a, b, c] = list
-            .each_ref()
-            .map(|ends| range(document, ends, SLOPE_MAX, unit, None));
-        Ok([a?, b?, c?])
+        let mut ranges = default;
+        let list = document.get("search", key);
+        let list = list.iter().flat_map(Value::items);
+        for (out, ends) in ranges.iter_mut().zip(list) {
+            *out = range(document, &ends, SLOPE_MAX, unit, None)?;
+        }
+        Ok(ranges)
     };
     let a = three("a_per_m", "1/m", [FALL_PER_M; 3])?;
     ranges.set("a_per_m", a);
@@ -101,15 +96,17 @@ fn product(a: Range, b: Range) -> Range {
 /// designed value.
 fn range(
     document: &Document<'_>,
-    ends: &Ends,
+    ends: &Value<'_>,
     most: f64,
     unit: &'static str,
     designed: Option<f64>,
 ) -> Result<Range, StageError> {
-    let [low, high] = document.exactly(ends)?;
-    let low = document.within(low, -most, most, unit)?;
-    let high = document.within(high, -most, most, unit)?;
-    let refused = |problem| Err(document.refuse(ends.span(), problem));
+    let mut both = [0.0; 2];
+    for (out, end) in both.iter_mut().zip(ends.items()) {
+        *out = document.within(&end, (-most, most), unit)?;
+    }
+    let [low, high] = both;
+    let refused = |problem| Err(document.refuse(ends, problem));
     if low > high {
         let problem = format!("the range [{low}, {high}] is reversed; write the lower end first");
         return refused(problem);

@@ -11,9 +11,8 @@
 //! hall = "uncompensated"   # uncompensated, compensated or GaAs, or h_per_k = [0.0, 2e-4]
 //! ```
 
-use super::document::{Document, List};
+use super::document::Document;
 use super::error::StageError;
-use toml::Spanned;
 
 /// What the table says.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,15 +56,12 @@ const COEFFICIENT_MAX: f64 = 0.01;
 pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, StageError> {
     const TABLE: &str = "temperature";
     let mut out = TemperatureTable {
-        columns: [
-            document.read(TABLE, "mount")?,
-            document.read(TABLE, "body")?,
-        ],
+        columns: ["mount", "body"].map(|key| Some(document.get(TABLE, key)?.as_text()?.to_owned())),
         ..TemperatureTable::default()
     };
     let twice = |one: &str, other: &str| {
         let problem = format!("`{one}` and `{other}` are both given; keep one of them");
-        Err(document.refuse(document.span(TABLE, other), problem))
+        Err(document.refuse(&document.require(TABLE, other)?, problem))
     };
     let unit = named(document, "unit", &UNITS)?;
     out.scale_mc = unit.unwrap_or(out.scale_mc);
@@ -80,7 +76,7 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
         (per_count, _) => {
             let key = per_count.map_or("c_at_zero", |_| "c_per_count");
             let problem = "codes need `c_per_count`, in degC per code and not 0";
-            return Err(document.refuse(document.span(TABLE, key), problem));
+            return Err(document.refuse(&document.require(TABLE, key)?, problem));
         }
     }
     let classes: [(_, &[_], _); 2] = [
@@ -90,16 +86,14 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
     for (prior, (class, known, numbers)) in out.prior_per_k.iter_mut().zip(classes) {
         let of_class = named(document, class, known)?;
         *prior = of_class.unwrap_or(*prior);
-        let list: Option<List<Spanned<f64>>> = document.read(TABLE, numbers)?;
-        if let Some(list) = &list {
+        if let Some(list) = document.get(TABLE, numbers) {
             if of_class.is_some() {
                 return twice(class, numbers);
             }
-            let [mean, deviation]: &[_; 2] = document.exactly(list)?;
-            *prior = [
-                document.within(mean, -COEFFICIENT_MAX, COEFFICIENT_MAX, "1/K")?,
-                document.within(deviation, 1e-9, COEFFICIENT_MAX, "1/K")?,
-            ];
+            for (k, (out, number)) in prior.iter_mut().zip(list.items()).enumerate() {
+                let least = [-COEFFICIENT_MAX, 1e-9][k];
+                *out = document.within(&number, (least, COEFFICIENT_MAX), "1/K")?;
+            }
         }
     }
     Ok(out)
@@ -111,20 +105,14 @@ fn named(
     key: &str,
     known: &[(&str, [f64; 2])],
 ) -> Result<Option<[f64; 2]>, StageError> {
-    let Some(name): Option<Spanned<String>> = document.read("temperature", key)? else {
+    let Some(value) = document.get("temperature", key) else {
         return Ok(None);
     };
-    let found = known.iter().find(|(known, _)| known == name.get_ref());
-    let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-    let problem = || {
-        format!(
-            "\"{}\" is not known; use one of {}",
-            name.get_ref(),
-            names.join(", ")
-        )
-    };
-    match found {
-        Some((_, value)) => Ok(Some(*value)),
-        None => Err(document.refuse(name.span(), problem())),
+    let name = value.as_text().unwrap_or_default();
+    if let Some((_, numbers)) = known.iter().find(|(known, _)| *known == name) {
+        return Ok(Some(*numbers));
     }
+    let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+    let problem = format!("\"{name}\" is not known; use one of {}", names.join(", "));
+    Err(document.refuse(&value, problem))
 }
