@@ -34,7 +34,7 @@ use crate::estimator::paper::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, 
 use crate::estimator::problem::Problem;
 use crate::solve::Projection;
 use crate::solve::search::cost::CostFunction;
-use crate::solve::search::random::{Phase, RandomSource, stream};
+use crate::solve::search::random::{Phase, stream};
 use hallstage_input::stage::{Range, paper_signs};
 use nalgebra::Vector3;
 use poles::{cut, slope_extent};

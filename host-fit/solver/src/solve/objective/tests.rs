@@ -12,7 +12,7 @@ use crate::estimator::rows::FieldRow;
 use crate::estimator::zero_deviation::ZeroDeviation;
 use crate::solve::Projection;
 use crate::solve::search::cost::CostFunction;
-use crate::solve::search::random::{Phase, RandomSource, stream};
+use crate::solve::search::random::{Phase, stream};
 use hallstage_input::stage::Range;
 use runtime::matrix::inverse;
 use runtime::{ModelKind, PlanarPose};
@@ -93,24 +93,6 @@ fn smallest_share(problem: &Problem<'_>, parameters: &Parameters) -> f64 {
         .iter()
         .map(share)
         .fold(f64::INFINITY, f64::min)
-}
-
-#[test]
-fn the_full_form_equals_the_runtimes_model() {
-    let (stage, dataset) = (stage(), dataset(7, 5));
-    for model in MODELS {
-        let problem = problem(&dataset, &stage, model);
-        let cost = objective(&problem, Projection::None);
-        for number in 0..50 {
-            let individual = draw(&cost, number);
-            let by_runtime = fitness_by_the_runtime(
-                &problem,
-                &cost.parameters(&individual).expect("parameters"),
-                &cost.own_delta_m(&individual).expect("its own"),
-            );
-            assert_close(cost.cost(&individual), by_runtime, 1e-11, "full form");
-        }
-    }
 }
 
 #[test]
@@ -230,22 +212,4 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
         ..problem.clone()
     };
     assert!(Objective::new(&no_ratios, Projection::Linear).is_none());
-}
-
-#[test]
-fn whatever_lies_beyond_a_pole_costs_nan() {
-    let (stage, dataset) = (stage(), dataset(6, 4));
-    let problem = problem(&dataset, &stage, ModelKind::M31);
-    let cost = objective(&problem, Projection::Linear);
-    let sound = individual(&cost, &truth());
-    assert!(cost.cost(&sound) < 3.0);
-    // a / eta of A with phi / eta of 0.06, 0.04, -0.5 in the first row.
-    let [z, rx, ry] = problem.rows.rows[0].vertical;
-    let at_share = |share: f64| {
-        let mut individual = sound.clone();
-        individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;
-        cost.cost(&individual)
-    };
-    assert!(at_share(0.06).is_finite());
-    assert!(at_share(0.04).is_nan() && at_share(-0.5).is_nan());
 }

@@ -2,7 +2,6 @@
 
 use super::cost::CostFunction;
 use super::mixing::Mixing;
-use super::random::stream;
 use super::tlbo::Population;
 use hallstage_input::watch::Watch;
 
@@ -109,9 +108,13 @@ pub(super) fn run(
     function: &dyn CostFunction,
     options: &SearchOptions<'_>,
 ) -> SearchResult {
-    let streams = |generation, phase, k| stream(options.seed, generation, phase, k);
-    let mut population =
-        Population::new(mixing, streams, function, options.population, options.first);
+    let mut population = Population::new(
+        mixing,
+        options.seed,
+        function,
+        options.population,
+        options.first,
+    );
     let progress = options.watch.begin("searching", options.generations as u64);
     let mut history = Vec::new();
     let reason = loop {

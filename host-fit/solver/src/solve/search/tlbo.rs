@@ -28,15 +28,14 @@ use super::operators::{
     learn_from_partner, learn_from_teacher, mutate_about_self, scatter_about_middle,
     teaching_factor,
 };
-use super::random::{Phase, RandomSource};
+use super::random::{Phase, Stream, stream};
 
 /// The individuals of a search, and p.
-pub struct Population<'f, S> {
+pub struct Population<'f> {
     mixing: Mixing,
     p: f64,
     function: &'f dyn CostFunction,
-    /// The random numbers for a generation, a phase and an individual.
-    streams: S,
+    seed: u64,
     individuals: Vec<Individual>,
     candidates: Vec<Individual>,
     /// Evaluations so far.
@@ -45,12 +44,12 @@ pub struct Population<'f, S> {
     pub nan_costs: usize,
 }
 
-impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
+impl<'f> Population<'f> {
     /// The first population (generation 0), evaluated: `first`, clipped to the bounds, then uniform draws
     /// from the box; `size` in all, at least 2. Entries of `first` with a wrong length are left out.
     pub fn new(
         mixing: Mixing,
-        streams: S,
+        seed: u64,
         function: &'f dyn CostFunction,
         size: usize,
         first: &[Vec<f64>],
@@ -60,7 +59,7 @@ impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
             let given = first.get(k).filter(|given| given.len() == bounds.len());
             let place = given.cloned().unwrap_or_else(|| {
                 let mut place = vec![0.0; bounds.len()];
-                streams(0, Phase::Start, k).fill_within(bounds, &mut place);
+                stream(seed, 0, Phase::Start, k).fill_within(bounds, &mut place);
                 place
             });
             let cost = f64::NAN;
@@ -73,7 +72,7 @@ impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
             evaluations: 0,
             nan_costs: 0,
             mixing,
-            streams,
+            seed,
             function,
         };
         population.evaluate();
@@ -116,7 +115,7 @@ impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
         let (teacher, mean) = (self.teacher(), self.mean());
         let individuals = &self.individuals;
         let make = |(k, candidate): (usize, &mut Individual)| {
-            let mut random = (self.streams)(generation, phase, k);
+            let mut random = stream(self.seed, generation, phase, k);
             let step = match self.mixing {
                 Mixing::Pure(step) => step,
                 Mixing::Hybrid(_) if random.uniform() < self.p => Step::Learn,
@@ -188,7 +187,7 @@ impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
 }
 
 /// The index of a partner: any of `count` individuals but `k`, all equally likely.
-fn another(k: usize, count: usize, random: &mut impl RandomSource) -> usize {
+fn another(k: usize, count: usize, random: &mut Stream) -> usize {
     let drawn = random.index(count - 1);
     if drawn < k { drawn } else { drawn + 1 }
 }
