@@ -60,17 +60,6 @@ fn every_tick_comes_out_whole_and_numbered_across_counter_wraps() {
 }
 
 #[test]
-fn frames_of_a_tick_may_come_in_any_order() {
-    let mut r = new(Layout::Bits16);
-    for sequence in 1..40 {
-        let [hall, gaps] = pair(sequence);
-        assert_eq!(r.take(&gaps, sequence * 2000), Taken::NOTHING);
-        let tick = r.take(&hall, sequence * 2000).tick;
-        assert_eq!(tick, Some(raw(sequence)));
-    }
-}
-
-#[test]
 fn a_dropped_frame_leaves_its_codes_missing_and_the_next_tick_whole() {
     let mut r = new(Layout::Bits16);
     feed(&mut r, Layout::Bits16, 1);
@@ -106,21 +95,6 @@ fn the_passing_of_time_ends_a_tick_and_then_calls_the_source_stale() {
     assert!(!r.is_stale());
     // A clock that steps back makes nothing stale.
     assert_eq!(r.poll(0), Taken::NOTHING);
-}
-
-#[test]
-fn a_delayed_frame_is_late_and_its_codes_are_not_used() {
-    let mut r = new(Layout::Bits16);
-    feed(&mut r, Layout::Bits16, 1);
-    let [hall_2, gaps_2] = pair(2);
-    let [hall_3, gaps_3] = pair(3);
-    r.take(&hall_2, 4_000);
-    assert!(r.take(&hall_3, 6_000).tick.is_some());
-    let message = Message::Capacitive;
-    let late = r.take(&gaps_2, 6_010);
-    assert_eq!(late.fault, Some(BusFault::Late { message }));
-    let taken = r.take(&gaps_3, 6_020);
-    assert_eq!((taken.tick, taken.fault), (Some(raw(3)), None));
 }
 
 #[test]
