@@ -150,8 +150,8 @@ pub(crate) fn run(
 mod tests;
 
 #[cfg(test)]
-#[path = "import/controller_tests.rs"]
-mod controller_tests;
+#[path = "import/clock_tests.rs"]
+mod clock_tests;
 
 #[cfg(test)]
 #[path = "import/hostile_tests.rs"]

@@ -3,7 +3,6 @@
 
 use super::tests::{candump, files, reference};
 use super::*;
-use std::fmt::Write;
 
 #[test]
 fn two_records_in_one_file_are_refused_where_the_second_begins() {
@@ -37,32 +36,6 @@ fn codes_beyond_the_converter_are_refused_and_those_at_its_rails_left_out() {
     let report = at_rails.run();
     assert!(report.bus.saturated > 0);
     assert_eq!(at_rails.log().rows.len(), report.join.rows);
-}
-
-/// Movements that start their time anew are laid end to end; here the bus ran on between them.
-#[test]
-fn movements_whose_time_starts_anew_after_a_pause_are_refused() {
-    let mut laid = String::new();
-    for line in reference().lines() {
-        let cells: Vec<&str> = line.splitn(3, ',').collect();
-        let numbers = cells[0]
-            .parse::<i64>()
-            .ok()
-            .zip(cells[1].parse::<i64>().ok());
-        let Some((movement, t_us)) = numbers else {
-            writeln!(laid, "{line}").expect("a string");
-            continue;
-        };
-        let paused_us = if movement > 0 { 150_000 } else { 0 };
-        let since_us = t_us - 500_000 * movement - paused_us;
-        if since_us >= 0 {
-            writeln!(laid, "{movement},{since_us},{}", cells[2]).expect("a string");
-        }
-    }
-    let import = files(&candump(|_, _| false), &laid);
-    // No offset fits all movements.
-    use ImportError::{Astray, NoOffset};
-    import.refused(|error| matches!(error, Astray { .. } | NoOffset { .. }));
 }
 
 #[test]

@@ -14,7 +14,7 @@ fn sampled_us(n: u32) -> f64 {
 /// clock of the reference, or `None` for a lost frame.
 fn candump(received_us: impl Fn(u32, &Coded) -> Option<f64>) -> String {
     let codes = |n| (hall(sampled_us(n)), [n as i32 + 1; 3], n + 5, 2_000 * n);
-    record(codes, |n, _, coded| received_us(n, coded))
+    record(750, codes, |n, _, coded| received_us(n, coded))
 }
 
 /// Receive times with a jitter of up to 1.2 ms.

@@ -1,7 +1,7 @@
 use super::*;
 use hal_adapters::can::command::{Mailbox, Outcome, Request};
 use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
-use runtime::{AnyDecoder, PlanarPose};
+use runtime::AnyDecoder;
 
 const SETTINGS: NodeSettings = NodeSettings {
     layout: Layout::Bits16,
@@ -50,26 +50,6 @@ fn contents(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Content> {
         .filter_map(|f| mailbox.take(&f)?.ok())
         .filter(|t| !matches!(t, Content::Status(_) | Content::Health(_)))
         .collect()
-}
-
-#[test]
-fn the_published_pose_has_the_bits_of_the_decoder() {
-    let decoder = decoder();
-    let mut node = Node::new(decoder, &SETTINGS);
-    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
-    let mut receiver = PoseReceiver::new(SETTINGS.timing);
-    for sequence in 3..500 {
-        let want = tracker.tick(&raw(sequence));
-        let sent = feed(&mut node, &raw(sequence));
-        let poses = sent
-            .iter()
-            .filter_map(|c| receiver.take(&BusFrame::from(*c), 0).tick);
-        let got: Vec<_> = poses.collect();
-        assert_eq!(got.len(), 1);
-        let bits = |p: PlanarPose<f32>| p.to_array().map(f32::to_bits);
-        assert_eq!(bits(got[0].pose), bits(want.pose.planar));
-        assert_eq!(got[0].status, want.status);
-    }
 }
 
 #[test]
