@@ -111,33 +111,6 @@ fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
 }
 
 #[test]
-fn a_log_of_another_gain_is_distinguished_from_the_first() {
-    let bench = Bench::new();
-    let log = log();
-    bench.write("first.csv", &log);
-    let halls = ["hall_a_cnt", "hall_b_cnt", "hall_c_cnt"];
-    bench.write(
-        "second.csv",
-        changed(&log, &halls, |_, code| (code * 103 + 50).div_euclid(100)),
-    );
-    let parts = ["all Hall probes", "in second.csv differs by +"];
-    bench.bad("fit first.csv second.csv --out p.bin", 4, &parts);
-    assert!(bench.holds_only(&["first.csv", "second.csv"]));
-    bench.good("fit first.csv second.csv --out p.bin --json p.json --force");
-    let json = bench.json("p.json");
-    let logs = json["logs"].as_array().expect("a list");
-    assert_eq!(logs.len(), 2);
-    for (log, name) in logs.iter().zip(["first.csv", "second.csv"]) {
-        assert_eq!(log["path"], name);
-        let x_um = number(&log["errors"]["x"]["rmse_um"]);
-        assert!((1.0..10.0).contains(&x_um), "{x_um}");
-    }
-    let movement = |k: usize| json["zero_deviations"][k]["movement"].as_str();
-    assert_eq!(movement(0), Some("first.csv:0"));
-    assert_eq!(movement(57), Some("second.csv:0"));
-}
-
-#[test]
 fn eval_judges_a_blob_by_its_own_errors() {
     let bench = Bench::new();
     let log = log();

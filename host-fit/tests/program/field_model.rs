@@ -91,38 +91,6 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     assert_eq!(bench.read("flash.bin"), bench.read("p.bin"));
 }
 
-/// A log of one movement with its reference `rows` rows late.
-fn late(log: &str, rows: usize) -> String {
-    let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
-    let mut lines: Vec<Vec<String>> = log.lines().map(cells).collect();
-    for row in (1 + rows..lines.len()).rev() {
-        let reference = lines[row - rows][2..5].to_vec();
-        lines[row][2..5].clone_from_slice(&reference);
-    }
-    lines.drain(1..=rows);
-    lines.iter().map(|cells| cells.join(",") + "\n").collect()
-}
-
-#[test]
-fn a_late_reference_is_reported_by_every_model_and_taken_off() {
-    let bench = bench();
-    bench.write("late.csv", late(&bench.text("log.csv"), 3));
-    for model in ["31", "field"] {
-        let fit = format!("fit late.csv --out p.bin --model {model} --json p.json");
-        let output = bench.good(&fit);
-        says(stderr(&output), "behind the probes");
-        let json = bench.json("p.json");
-        let lag = &json["reference_lag"];
-        let (value_us, error_us) = (number(&lag["value_us"]), number(&lag["standard_error_us"]));
-        assert!(
-            (value_us - 6000.0).abs() < 4.0 * error_us && lag["compensated"] == true,
-            "{lag}"
-        );
-    }
-    let rms = &bench.json("p.json")["errors"]["y"]["rmse_um"];
-    assert!(rms.as_f64() < Some(0.6), "{rms}");
-}
-
 #[test]
 fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
     let bench = bench();

@@ -47,13 +47,6 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
             .replace("period_s = 0.04 ", "period_s = 0.002 "),
     );
     bench.good(fit);
-    bench.write("old.csv", log());
-    bench.good("fit old.csv --out old.bin --json old.json");
-    bench.good(&format!("{fit} --json new.json"));
-    assert_eq!(
-        bench.json("new.json")["errors"],
-        bench.json("old.json")["errors"]
-    );
     let shown = stdout(&bench.good("init log.csv --out -"));
     assert_eq!(shown, text);
     bench.good("init log.csv --force");

@@ -5,7 +5,6 @@
 mod bad_input;
 mod common;
 mod diagnose;
-mod documents;
 mod field_model;
 mod generated_logs;
 mod interrupted;

@@ -53,15 +53,6 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
         assert!(number(&before[axis]) > 1.2 * floor, "{axis}");
         assert!(number(&after[axis]) < 1.02 * floor, "{axis}");
     }
-    let good = bench.rms("old.bin", "log.csv");
-    let (before, after) = (
-        bench.rms("old.bin", "later.csv"),
-        bench.rms("new.bin", "later.csv"),
-    );
-    assert!(before[1] > 5.0 * good[1], "{before:?} {good:?}");
-    for axis in 0..3 {
-        assert!(after[axis] < 1.02 * good[axis], "{after:?} {good:?}");
-    }
     let inspected = bench.figures("inspect new.bin");
     assert_eq!(
         (&inspected["serial"], &inspected["created"]),
@@ -77,8 +68,6 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     let alone = bench.good(&format!("{recalibrate} --out alone.bin"));
     assert!(stderr(&alone).contains("no posterior stands beside"));
     assert!(!bench.has("alone.bin.posterior"));
-    let alone = bench.rms("alone.bin", "later.csv");
-    assert!(alone[1] < 1.02 * good[1], "{alone:?} {good:?}");
 }
 
 #[test]
