@@ -4,13 +4,11 @@
 //! |---|---|
 //! | [`flash_model`] | two sectors of flash, and cuts of the power |
 //! | [`job`] | frames in, words out: the files that host and target exchange |
-//! | [`motion`] | frames and parameters for a job: a log, random codes, random words |
+//! | [`motion`] | frames for a job: a log, random codes, random words |
 //! | [`compare`] | the host's words of a job beside the target's |
-//! | [`listing`] | the instructions of an image: stack, jumps, calls |
 //! | [`fault`] | frames dropped, repeated, delayed and damaged on the way, by a seed |
 //! | [`random`] | random numbers that depend on a seed alone |
 //! | [`node`] | a node that takes new parameters over the bus |
-//! | [`trace`] | executed instructions, counted from an emulator's log |
 
 use firmware::store::{Flash, SLOT_BYTES};
 use hal_adapters::can::update::NotWritten;
@@ -22,11 +20,9 @@ pub mod fault;
 #[path = "../../runtime/firmware/tests/flash_model/mod.rs"]
 pub mod flash_model;
 pub mod job;
-pub mod listing;
 pub mod motion;
 pub mod node;
 pub mod random;
-pub mod trace;
 
 /// How the program `name` ends: well, with a failed check, or with an error that is printed.
 pub fn exit(name: &str, outcome: Result<bool, Box<dyn Error>>) -> ExitCode {

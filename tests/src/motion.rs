@@ -1,13 +1,10 @@
-//! Sections of a job: the rows of a log, random codes, random terms of the field model.
+//! Sections of a job: the rows of a log, random codes.
 
 use crate::job::{self, Head};
 use host_fit::input::dataset::Dataset;
-use nalgebra::RowVector3;
 use rand::{Rng, RngExt};
+use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
-use runtime::geometry::SensingAxes;
-use runtime::model::{FieldProbe, Probes, Sensitivity, Shape};
-use runtime::{ModelKind, ParameterSet, RawFrame, Temperature};
 
 /// One section: parameters as they lie in the file, and the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,69 +92,4 @@ pub fn uniform_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
 pub fn wild_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
     let frame = |_| job::frame(std::array::from_fn(|_| rng.random()));
     (0..frames).map(frame).collect()
-}
-
-/// A probe of the field model with random terms: each adds up to a fiftieth of the signal
-/// where that is largest.
-fn field_probe(
-    rng: &mut impl Rng,
-    sensitivity: &Sensitivity<f32>,
-    lateral: [f32; 3],
-) -> FieldProbe<f32> {
-    /// Codes of a displacement of half a millimetre; zr and tilt at the end of their ranges.
-    const FULL: f32 = 8e3;
-    const HEIGHT: f32 = 0.1;
-    const VERTICAL: f32 = 5e-4;
-    let mut part = || FULL / 50.0 * rng.random_range(-1.0..1.0f32);
-    let mut pair = |full: f32| [part() / full, part() / (full * HEIGHT)];
-    FieldProbe {
-        sensitivity: *sensitivity,
-        shape: Shape {
-            u_w_w: pair(FULL * FULL * FULL),
-            u_w: pair(FULL * FULL),
-            u_z_z: pair(FULL * HEIGHT * HEIGHT),
-            u_u_u: pair(FULL * FULL * FULL),
-            u_u: pair(FULL * FULL),
-            w_w: pair(FULL * FULL),
-            w_z: pair(FULL * HEIGHT),
-            z_z: pair(HEIGHT * HEIGHT),
-            u_u_w: part() / (FULL * FULL * FULL),
-            w_w_w: part() / (FULL * FULL * FULL),
-        },
-        carry: [part() / VERTICAL, part() / VERTICAL, part() / VERTICAL],
-        lateral,
-    }
-}
-
-/// The set with random temperature coefficients, about 20 degC.
-pub fn warm_set(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
-    let mut set = set.clone();
-    let mut pair = || {
-        [
-            rng.random_range(-2e-6..-1e-6),
-            rng.random_range(-2e-7..2e-7),
-        ]
-    };
-    set.constants.temperature = Temperature {
-        per_mk: [pair(), pair(), pair()],
-        zero_mc: [20_125, 21_250],
-        reach_mk: [Temperature::<f32>::REACH_MK; 2],
-    };
-    set
-}
-
-/// The parameter set of Model (31) with random terms of the field model added.
-pub fn field_set(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
-    let (axes, _) = SensingAxes::from_plane(&set.plane);
-    let [a, b, c] = set.probes.sensitivities();
-    let [across_a, across_b, across_c] = axes.across();
-    let probes = [(a, across_a), (b, across_b), (c, across_c)].map(|(sensitivity, [x, y])| {
-        let row = RowVector3::new(x, y, rng.random_range(-0.4..0.4));
-        field_probe(rng, sensitivity, (row * set.plane_inverse).into())
-    });
-    ParameterSet {
-        model: ModelKind::Field,
-        probes: Probes::Field(probes),
-        ..set.clone()
-    }
 }

@@ -7,11 +7,10 @@ use crate::random::Random;
 use firmware::node::{Facts, Node as Ticking, Parameters};
 use firmware::outbox::Outbox;
 use firmware::records::{Choice, Loaded, Records};
-use firmware::retained::{FaultKind, Retained, Step, WORDS};
+use firmware::retained::{Retained, WORDS};
 use firmware::schedule::PERIOD_US;
 use firmware::start_up::{Before, Cause, PROVEN_TICKS};
 use firmware::store::Image;
-use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
 use runtime::RawFrame;
@@ -117,15 +116,6 @@ impl Node {
         self.start(Cause::Reset);
     }
 
-    /// The program panics in a tick.
-    pub fn fault(&mut self) {
-        let mut record = Retained::from_words(&self.retained).unwrap_or_default();
-        record.step = Step::Ticking;
-        record.note(FaultKind::Panic, 0, 0);
-        self.retained = record.to_words();
-        self.start(Cause::Reset);
-    }
-
     fn start(&mut self, cause: Cause) {
         let before = Before::new(cause, Retained::from_words(&self.retained));
         let mut flash = self.flash().clone();
@@ -161,24 +151,9 @@ impl Node {
         })
     }
 
-    /// The CRC of the blob that runs.
-    pub fn running(&self) -> Option<u32> {
-        self.records.running().map(|running| running.id.crc)
-    }
-
     /// The highest sequence number; 0 for a plain blob.
     pub fn records(&self) -> u32 {
         self.records.newest_sequence()
-    }
-
-    /// State and reason after the last tick.
-    pub const fn state(&self) -> (NodeState, u8) {
-        self.ticking.state()
-    }
-
-    /// Whether a transfer is open.
-    pub fn is_updating(&self) -> bool {
-        self.ticking.state().0 == NodeState::Updating
     }
 }
 

@@ -39,7 +39,7 @@ enum Command {
 
 #[derive(Args)]
 struct Make {
-    /// The parameter blob of a fit by Model (31); the field model's is made of it.
+    /// The parameter blob of a fit by Model (31); those of the field model are the runtime's examples.
     params: PathBuf,
     /// The log; default: the log that ships with the program.
     #[arg(long)]
@@ -58,6 +58,9 @@ struct Make {
     unpredicted: bool,
 }
 
+/// Examples of the field model: each of its terms is there, and temperatures in the second.
+const FIELD_MODEL: &[u8] = include_bytes!("../../../runtime/examples/field.bin");
+const WARM: &[u8] = include_bytes!("../../../runtime/examples/warm.bin");
 /// Longest hold of an invalid value, ticks.
 const HOLD: u16 = 3;
 
@@ -90,10 +93,12 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
     };
     let rows = dataset.rows.len();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let field_set = motion::field_set(&mut rng, &set);
+    let field_set = ParameterSet::from_bytes(FIELD_MODEL)?;
+    let temperature = ParameterSet::from_bytes(WARM)?.constants.temperature;
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
-        let warm = motion::warm_set(&mut rng, set);
+        let mut warm = set.clone();
+        warm.constants.temperature = temperature;
         let mut buffer = [0; MAX_BYTES];
         let blob = warm.to_bytes(&mut buffer)?;
         let frames = motion::uniform_frames(&mut rng, codes / 2);

@@ -3,7 +3,6 @@
 use super::world::{World, flashed};
 use super::{KEY, NEW, OLD, SERIAL, activating, changed, for_serial, plan, undeclared};
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
-use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
 use host_fit::bus::update::{RezeroSettings, UpdateError, UpdateSettings, Updated, on};
 use tests::fault::Fault;
@@ -208,45 +207,23 @@ fn an_interrupted_update_closes_its_transfer() {
 }
 
 #[test]
-fn parameters_that_fault_twice_stop_the_node_until_others_are_stored() {
-    let mut world = World::new(Some(KEY), &[], 6);
-    world.faults_after_activation_us = vec![1_000_000, 2_000_000];
-    let result = world.update(&activating(plan(NEW)));
-    assert_eq!(result, Err(UpdateError::NotActive { sequence: 1 }));
-    for _ in 0..3 {
-        assert_eq!(world.node.state(), (NodeState::Stopped, 1));
-        assert_eq!(world.node.running(), None);
-        (0..20_000).for_each(|_| drop(world.slot()));
-        world.node.reset();
-        (0..2_000).for_each(|_| drop(world.slot()));
-    }
-    let back = world.update(&activating(plan(OLD))).expect("it is stored");
-    assert!(back.is_active);
-    assert_eq!(world.node.running(), blob_crc(OLD));
-}
-
-#[test]
 fn a_stage_at_rest_is_zeroed_by_its_key_with_the_servo_off_on_a_bad_bus_too() {
-    let zero = RezeroSettings {
-        key: Some(KEY),
-        declares_servo_off: true,
-        clears: false,
+    let settings = |key, declares_servo_off, clears| RezeroSettings {
+        key,
+        declares_servo_off,
+        clears,
     };
-    let rezero = |world: &mut World, zero: &RezeroSettings| on::rezero(&mut world.talk(), zero);
-    let mut no_key = zero.clone();
-    no_key.key = None;
-    let mut undeclared = zero.clone();
-    undeclared.declares_servo_off = false;
-    let mut clear = zero.clone();
-    clear.clears = true;
+    let rezero = |world: &mut World, settings| on::rezero(&mut world.talk(), &settings);
     for seed in 0..10 {
         let mut world = World::new(Some(KEY), &[(Fault::Drop, 100_000)], seed);
-        assert_eq!(rezero(&mut world, &no_key), Err(UpdateError::NotAuthorised));
-        let refused = Err(UpdateError::ServoOn { declared: false });
-        assert_eq!(rezero(&mut world, &undeclared), refused);
-        for (wanted, is_zeroed) in [(&zero, true), (&clear, false)] {
-            assert_eq!(rezero(&mut world, wanted), Ok(()), "{seed}");
-            assert_eq!(world.node.is_zeroed(), is_zeroed, "{seed}");
+        let refused = rezero(&mut world, settings(None, true, false));
+        assert_eq!(refused, Err(UpdateError::NotAuthorised));
+        let refused = rezero(&mut world, settings(Some(KEY), false, false));
+        assert_eq!(refused, Err(UpdateError::ServoOn { declared: false }));
+        for clears in [false, true] {
+            let done = rezero(&mut world, settings(Some(KEY), true, clears));
+            assert_eq!(done, Ok(()), "{seed}");
+            assert_eq!(world.node.is_zeroed(), !clears, "{seed}");
         }
     }
 }

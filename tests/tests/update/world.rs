@@ -41,12 +41,9 @@ pub struct World {
     /// The user stops the script at this frame of the host.
     pub interrupt_at: Option<usize>,
     token: u8,
-    faults_us: Vec<u64>,
     /// Frames that the host has not received yet.
     heard: VecDeque<BusFrame>,
     pub overruns: u32,
-    /// The program faults so long after it was first activated, us.
-    pub faults_after_activation_us: Vec<u64>,
     /// Answers of the node that no host hears.
     pub loses: fn(&Answer) -> bool,
 }
@@ -65,10 +62,8 @@ impl World {
             declares_on_once_stored: false,
             interrupt_at: None,
             token: 8,
-            faults_us: Vec::new(),
             heard: VecDeque::new(),
             overruns: 0,
-            faults_after_activation_us: Vec::new(),
             loses: |_| false,
         }
     }
@@ -97,15 +92,8 @@ impl World {
             self.to_node.send(self.now_us, frame);
             self.heard.push_back(frame);
         }
-        if self.node.resets() > 0 && (self.faults_us.first()).is_some_and(|at| *at <= self.now_us) {
-            self.faults_us.remove(0);
-            self.fault();
-        }
         if self.node.is_to_be_reset() {
             self.node.reset();
-            let faults = self.faults_after_activation_us.drain(..);
-            self.faults_us
-                .extend(faults.map(|after| self.now_us + after));
             self.fifo.clear();
             self.deaf_until_us = self.now_us + START_US;
         }
@@ -120,13 +108,6 @@ impl World {
             }
         }
         self.to_hosts.arrived(self.now_us)
-    }
-
-    /// The program faults, and is deaf until its next start.
-    fn fault(&mut self) {
-        self.node.fault();
-        self.fifo.clear();
-        self.deaf_until_us = self.now_us + START_US;
     }
 
     /// Sends a request of another host after so long.

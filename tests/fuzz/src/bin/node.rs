@@ -1,10 +1,11 @@
-//! Frames into a decoding node and into a host: whatever comes, a pose is finite or marked
-//! invalid, and nothing is done that was not asked for.
+//! Frames into a decoding node, a controller and a host: whatever comes, a pose is finite or marked
+//! invalid, and nothing is done that was not asked for. Only a blob that was sent whole is stored, and
+//! without the key none.
 
 #![no_main]
 
 use fuzz::PARAMS;
-use fuzz::bus::{Numbers, Step, steps};
+use fuzz::bus::{NEW, Numbers, Step, steps};
 use hal_adapters::can::command::{Mailbox, Request};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing,
@@ -12,6 +13,8 @@ use hal_adapters::can::{
 use libfuzzer_sys::fuzz_target;
 use runtime::{OnInvalid, ParameterSet, PoseTracker, Predictor, Reading};
 use std::sync::LazyLock;
+use tests::flash_model::FlashModel;
+use tests::node::Node;
 
 static SET: LazyLock<ParameterSet> =
     LazyLock::new(|| ParameterSet::from_bytes(PARAMS).expect("the blob of the examples"));
@@ -50,6 +53,11 @@ fuzz_target!(|data: &[u8]| {
     let (mut host, mut numbers) = (Mailbox::default(), Numbers::default());
     let mut predictor = Predictor::new(3_000);
     let (mut now_us, mut asked_to_record) = (0u32, false);
+    let mut flash = FlashModel::erased();
+    flash.load(0, PARAMS);
+    let key = (form & 2 == 2).then_some([7; 16]);
+    let mut controller = Node::new(Some("HS-0007"), key, flash, form.into());
+    let mut records = 0;
     let mut step = |step: Step| match step {
         Step::Frame(frame) => {
             let _ = (host.take(&frame), poses.take(&frame, now_us));
@@ -91,6 +99,24 @@ fuzz_target!(|data: &[u8]| {
         }
     };
     for what in steps(data, &mut numbers) {
+        let (ticks, frame) = match what {
+            Step::Frame(frame) => (1, Some(frame)),
+            Step::Ticks(ticks) => (ticks, None),
+            Step::Wait(_) => (0, None),
+        };
         step(what);
+        for _ in 0..ticks {
+            controller.tick(0, frame);
+            while controller.send().is_some() {}
+        }
+        if controller.is_to_be_reset() {
+            controller.reset();
+        }
+        if controller.records() != records {
+            records += 1;
+            assert!(key.is_none() && controller.records() == records);
+            assert!(controller.newest().is_some_and(|blob| blob == *NEW));
+        }
     }
+    assert!(controller.newest().is_some());
 });

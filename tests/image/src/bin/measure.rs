@@ -6,21 +6,23 @@
 #![no_std]
 #![no_main]
 
-mod inputs;
-
+use core::array::from_fn;
 use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::{Coded, Layout, Message, SensorReceiver, Timing, sensor};
+use image::job;
 use image::semihost::{CONSOLE, File, exit};
-use inputs::{FIELD_PROBES, PROBES, SOUND, Words, codes, decoder_of, field_probe, linear_probe};
 use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::Decoder;
 use runtime::model::{FieldProbe, Sensitivity};
 use runtime::{
-    Decode, FieldModel, LinearModel, Model, MotionCorrection, OnInvalid, PlanarMotion, PlanarPose,
-    PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
+    AnyDecoder, Decode, FieldModel, LinearModel, Model, MotionCorrection, OnInvalid, ParameterSet,
+    PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
 };
+
+const MODEL_31: &[u8] = include_bytes!("../../../../runtime/examples/stage.bin");
+const FIELD_MODEL: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 
 /// Displacements read by the probes.
 #[repr(C)]
@@ -238,60 +240,76 @@ fn wrong_settings_are_found() -> bool {
         && (1..=3).all(|mode| check_with(mode << 22) == rounding)
 }
 
+/// A plain pseudo-random sequence (xorshift).
+struct Words(u32);
+
+impl Words {
+    fn next(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        self.0
+    }
+
+    /// Codes of 16 bits, or of any in each fourth round.
+    fn codes(&mut self, round: u32) -> RawFrame {
+        job::frame(from_fn(|_| match round % 4 {
+            3 => self.next(),
+            _ => (self.next() as i32 >> 16) as u32,
+        }))
+    }
+}
+
+/// The decoder of a blob.
+fn decoder(blob: &[u8]) -> AnyDecoder {
+    match ParameterSet::from_bytes(blob) {
+        Ok(set) => set.decoder(),
+        Err(_) => exit(false),
+    }
+}
+
 #[entry]
 fn main() -> ! {
-    let Ok(mut console) = File::write_to(CONSOLE) else {
+    let (Ok(mut console), AnyDecoder::Linear(decoder), AnyDecoder::Field(field)) = black_box((
+        File::write_to(CONSOLE),
+        decoder(MODEL_31),
+        decoder(FIELD_MODEL),
+    )) else {
         exit(false)
     };
+    let zero = black_box(PlanarPose::ZERO);
     let mut words = Words(0x1234_5678);
     let mut reading = Reading::default();
     // SAFETY: the loop above, which touches r0 and the flags.
     unsafe { counted_loop_1000() };
-    for k in 0..300 {
-        let frame = black_box(codes(&mut words, k));
-        let (decoder, zero) = black_box(decoder_of::<LinearModel>(
-            &mut words,
-            k,
-            PROBES,
-            linear_probe,
-        ));
+    let kernel = Kernel {
+        planar_per_code: decoder.constants().planar_per_code,
+        probes: *decoder.probes(),
+    };
+    let field_kernel = FieldKernel {
+        planar_per_code: field.constants().planar_per_code,
+        probes: *field.probes(),
+    };
+    for round in 0..300 {
+        let frame = black_box(words.codes(round));
         let signal = Signal(frame.hall.map(|code| code as f32), [0.0; 3]);
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
-        let c = Kernel {
-            planar_per_code: decoder.constants().planar_per_code,
-            probes: *decoder.probes(),
-        };
-        counted_kernel(&c, &signal, &vertical, &zero, &mut pose);
+        counted_kernel(&kernel, &signal, &vertical, &zero, &mut pose);
         black_box(&pose);
         counted_tick(&decoder, &frame, &zero, &mut reading);
         black_box(&reading);
         #[cfg(c_reference)]
         // SAFETY: structs of the same layout, as the C file declares them.
         unsafe {
-            counted_c_kernel(&c, &signal, &vertical, &zero, &mut pose);
+            counted_c_kernel(&kernel, &signal, &vertical, &zero, &mut pose);
             counted_c_tick(&decoder, &frame, &zero, &mut reading);
         }
-        let (decoder, zero) = black_box(decoder_of::<FieldModel>(
-            &mut words,
-            k,
-            FIELD_PROBES,
-            field_probe,
-        ));
-        let c = FieldKernel {
-            planar_per_code: decoder.constants().planar_per_code,
-            probes: *decoder.probes(),
-        };
-        counted_field_kernel(&c, &signal, &vertical, &zero, &mut pose);
+        counted_field_kernel(&field_kernel, &signal, &vertical, &zero, &mut pose);
         black_box(&pose);
-        counted_field_tick(&decoder, &frame, &zero, &mut reading);
+        counted_field_tick(&field, &frame, &zero, &mut reading);
         black_box(&reading);
-        // Any words, NaN among them, and numbers as at work.
-        let mut number = || match k % 3 {
-            0 => f32::from_bits(words.next()),
-            _ => words.next() as i32 as f32 * 1e-15,
-        };
-        let mut three = || [number(), number(), number()];
+        let mut three = || [(); 3].map(|()| words.next() as i32 as f32 * 1e-15);
         let correction = MotionCorrection {
             acceleration_s2: [three(), three(), three()],
             velocity_s: [three(), three(), three()],
@@ -304,8 +322,6 @@ fn main() -> ! {
         counted_motion(&correction, &pose, &commanded, &mut corrected);
         black_box(corrected);
     }
-    let decoder = black_box(Decoder::<LinearModel>::new(SOUND, PROBES));
-    let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
     let mut tracker = PoseTracker::new(&decoder as &dyn Decode, OnInvalid::Hold { ticks: 3 });
     let mut predictor = Predictor::new(4_000);
     let mut frame = RawFrame::new([900, -800, 700], [50, 60, 70], 0, 0);
@@ -331,7 +347,7 @@ fn main() -> ! {
         receiver.take_data(first.message.id().as_raw(), &first.bytes, 0);
     }
     for k in 1..100 {
-        let mut sent = codes(&mut words, 0);
+        let mut sent = words.codes(0);
         sent.sequence = k;
         counted_can_code(black_box(&sent), &mut coded);
         counted_can_check(&mut receiver, black_box(&coded), 2000 * k, &mut sent);
