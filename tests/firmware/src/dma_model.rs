@@ -160,33 +160,3 @@ impl Dma {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn enabled(stream: usize, settings: u32) -> Dma {
-        let mut dma = Dma::default();
-        let at = STREAMS + stream * STRIDE;
-        for (offset, value) in [(4, 30), (8, SPI1_DR), (0xc, RAM + 8), (0, settings | 1)] {
-            dma.write(at + offset, value);
-        }
-        dma
-    }
-
-    /// Table 43, and the directions of section 10.5.5.
-    #[test]
-    fn spi_1_is_served_by_four_streams_on_channel_3() {
-        for (request, direction, serving) in [
-            (Request::Spi1Rx, 0, [0, 2]),
-            (Request::Spi1Tx, 1 << 6, [3, 5]),
-        ] {
-            for (stream, channel) in (0..8).flat_map(|s| (0..8).map(move |c| (s, c))) {
-                let mut dma = enabled(stream, channel << 25 | NEXT_ADDRESS | direction);
-                let served = dma.serves(request).map(|side| (side.count, side.at(2)));
-                let wanted = channel == 3 && serving.contains(&stream);
-                assert_eq!(served, wanted.then_some((30, 10)), "{stream} {channel}");
-            }
-        }
-    }
-}

@@ -162,29 +162,3 @@ impl FlashModel {
         self.busy_until_ns = now_ns + ERASE_NS;
     }
 }
-
-#[cfg(test)]
-mod of_registers {
-    use super::*;
-
-    const WORD: u32 = WORDS | PG;
-
-    fn open(flash: &mut FlashModel) {
-        KEYS.iter()
-            .for_each(|key| flash.write_register(KEYR, *key, 0));
-    }
-
-    #[test]
-    fn a_locked_flash_takes_nothing() {
-        let mut flash = FlashModel::new();
-        flash.write_register(CR, WORD, 0);
-        flash.write(0, 4, 0, 0);
-        assert_eq!(flash.read(0, 4), 0xffff_ffff);
-        assert_eq!(flash.read_register(SR, &mut 0), SEQUENCE);
-        flash.write_register(KEYR, 1, 0);
-        open(&mut flash);
-        flash.write_register(CR, WORD, 0);
-        flash.write(0, 4, 0, 0);
-        assert_eq!(flash.read(0, 4), 0xffff_ffff);
-    }
-}

@@ -62,7 +62,7 @@ const CHECKS: &[(&str, Check)] = &named! {
     parameters: one_usable, unusable;
     commands: order_and_age, identify, any_length_code;
     update: new_parameters, refused, no_nonce_twice, hardware_that_fails, power_cuts;
-    stopped: a_reset_runs_the_previous_blob, parameters_that_crash;
+    stopped: parameters_that_crash;
     authority: tag_or_line;
     neighbour: has_identifiers_and_a_period_of_its_own;
 };

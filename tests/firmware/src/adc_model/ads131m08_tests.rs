@@ -61,24 +61,6 @@ fn the_first_conversion_ends_when_table_8_3_says() {
     }
 }
 
-/// Table 8-8, and 8.3.7.1.1: two conversions of the fast-settling filter, then sinc3.
-#[test]
-fn after_a_reset_the_codes_are_settled_from_the_first_one_on() {
-    let mut part = Ads131m08::default();
-    let powered = POWER_ON_NS;
-    let (settle_1, settle_3) = (powered + 1324 * T_MOD_NS, powered + 3372 * T_MOD_NS);
-    assert_eq!(part.next_end_ns(), settle_1);
-    for n in 0..3 {
-        let end = settle_1 + n * 1024 * T_MOD_NS;
-        assert_eq!(frame(&mut part, end - 1, 0, 0).0 & 0xff, 0);
-        let (status, codes) = frame(&mut part, end, 0, 0);
-        assert_eq!((status & 0xff, &codes[..6]), (0xff, &CONSTANT[..]));
-        let fast = part.shown.map(|conversion| conversion.fast);
-        assert_eq!(fast, Some(n < 2));
-    }
-    assert_eq!(part.shown.map(|c| c.end_ns), Some(settle_3));
-}
-
 #[test]
 fn after_a_resynchronisation_two_conversions_are_not_settled_and_not_held_back() {
     for wait in [0, 44, INITIAL_WAIT] {
@@ -97,58 +79,4 @@ fn after_a_resynchronisation_two_conversions_are_not_settled_and_not_held_back()
         assert!((codes[1] - 50_000).abs() < 300, "{codes:?}");
         assert_eq!(codes[2..], [60_000; 2]);
     }
-}
-
-/// 8.5.1.9.1: flags stay until both samples are read; SYNC empties the store.
-#[test]
-fn after_a_pause_the_store_holds_two_conversions() {
-    for store in [Store::KeepsOldest, Store::KeepsNewest, Store::ReplacesLast] {
-        for late_pop in [false, true] {
-            let variant = Variant {
-                store,
-                late_pop,
-                ..Variant::PLAIN
-            };
-            let mut part = running(variant);
-            let ready = |part: &mut _| frame(part, T_0, 0, 0).0 & 0xff;
-            assert_eq!([(); 3].map(|()| ready(&mut part)), [0xff, 0xff, 0]);
-            let first = T_0 - 500_000 + 32_000;
-            let last = T_0 - 500_000 + 15 * 32_000;
-            let mut part = running(variant);
-            let ends = [(); 2].map(|()| {
-                frame(&mut part, T_0, 0, 0);
-                part.shown.map(|conversion| conversion.end_ns)
-            });
-            let want = match store {
-                Store::KeepsOldest => [first, first + 32_000],
-                Store::KeepsNewest => [last - 32_000, last],
-                Store::ReplacesLast => [first, last],
-            };
-            assert_eq!(ends, want.map(Some));
-            let mut part = running(variant);
-            pulse(&mut part, T_0 + 5000);
-            assert_eq!(frame(&mut part, T_0 + 6000, 0, 0).0, 0x4500);
-        }
-    }
-}
-
-/// "Synchronization": an edge at the end of a conversion does nothing; t_w(RSL) is a reset.
-#[test]
-fn a_pulse_synchronises_unless_it_is_aligned_and_resets_if_it_is_long() {
-    let mut part = running(Variant::PLAIN);
-    let aligned = T_0 - 500_000 + 20 * 32_000;
-    pulse(&mut part, aligned);
-    assert!(!part.resynchronised);
-    pulse(&mut part, aligned + 16_000);
-    assert!(part.resynchronised);
-    assert_eq!(frame(&mut part, aligned + 17_000, 0, 0).0, 0x4500);
-    assert_eq!(frame(&mut part, aligned + 17_000, 0, 0).0, 0x0500);
-
-    part.sync(false, T_0 + 1_000_000);
-    part.sync(true, T_0 + 1_000_000 + 2047 * T_CLKIN_NS);
-    assert_eq!(part.registers[CLOCK], 0xff02);
-    part.sync(false, T_0 + 2_000_000);
-    assert_eq!(frame(&mut part, T_0 + 2_300_000, 0, 0).0, 0);
-    part.sync(true, T_0 + 2_300_000);
-    assert_eq!(part.registers[CLOCK], 0xff0e);
 }

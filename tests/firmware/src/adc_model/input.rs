@@ -90,20 +90,3 @@ impl Input {
         self.rows.get(k).copied().unwrap_or_default()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ROWS: [Row; 2] = [[0; 6], [100, 200, -100, 0, 1, 2]];
-
-    #[test]
-    fn a_motion_is_linear_from_row_to_row_and_ends_with_the_last() {
-        let mut input = Input::moving(ROWS.to_vec(), 2000, 1);
-        input.start(0);
-        assert_eq!(input.at(0), [0.0; 6]);
-        assert_eq!(input.at(501_000), [25.0, 50.0, -25.0, 0.0, 0.25, 0.5]);
-        assert_eq!(input.at(9_000_000), ROWS[1].map(f64::from));
-        assert_eq!(input.constant(1000, 1000), None);
-    }
-}

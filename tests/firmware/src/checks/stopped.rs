@@ -1,4 +1,4 @@
-//! The parameters after a reset: the same as before it, or none where the program faults at its start.
+//! Parameters that make the program fault at its start.
 
 use super::asking::{SERVO_OFF, answers};
 use super::start::{NOWHERE, TICK};
@@ -10,21 +10,6 @@ use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
 use host_fit::bus::update::UpdateSettings;
-
-/// A stored blob waits: the blob that ran runs after resets of any cause, until power-on.
-pub fn a_reset_runs_the_previous_blob(bench: &Bench) {
-    let mut machine = bench.running(20);
-    updated(&mut machine, &plan(&bench.later));
-    machine.reset_by_pin();
-    assert_eq!(running(&mut machine), bench.blob);
-    machine.run_ticks(600);
-    machine.hold_ns = 60_000_000;
-    machine.run_ticks(100);
-    assert_eq!(machine.watchdog_resets, 1);
-    assert_eq!(running(&mut machine), bench.blob);
-    machine.power_cycle();
-    assert_eq!(running(&mut machine), bench.later);
-}
 
 /// Parameters that make the program fault twice at its start stop it: none run, and the state says so, also
 /// after resets, until the user goes back.

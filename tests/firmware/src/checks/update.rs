@@ -4,7 +4,7 @@ use super::asking::{SERVO_OFF, answers, ask};
 use super::parameters::{for_stage_7, host_poses};
 use super::same_words;
 use crate::bench::{Bench, Seen};
-use crate::flash_model::{BYTES, PowerCut};
+use crate::flash_model::PowerCut;
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::BusFrame;
@@ -212,31 +212,6 @@ pub fn no_nonce_twice(bench: &Bench) {
     }
 }
 
-/// What fails in an update.
-#[derive(Clone, Copy, Debug)]
-enum Failure {
-    /// The flash reports an error at this operation.
-    Reported(usize),
-    /// A word of flash does not change.
-    Stuck(usize),
-    /// The supply drops at this operation.
-    Supply(usize),
-}
-
-fn set_failure(machine: &mut Machine, failure: Option<Failure>) {
-    let (chip, sectors) = (&mut machine.chip, |failure| match failure {
-        Some(Failure::Reported(at)) => (Some(at), None),
-        Some(Failure::Stuck(word)) => (None, Some(word)),
-        _ => (None, None),
-    });
-    let (reports, stuck) = sectors(failure);
-    (chip.flash.sectors.reports, chip.flash.sectors.stuck) = (reports, stuck);
-    chip.supply_drops_at = match failure {
-        Some(Failure::Supply(at)) => Some(at),
-        _ => None,
-    };
-}
-
 /// Operations of the flash in an update.
 fn operations(bench: &Bench) -> usize {
     let mut machine = bench.running(20);
@@ -244,39 +219,31 @@ fn operations(bench: &Bench) -> usize {
     machine.chip.flash.sectors.operations
 }
 
-/// Flash that fails or a supply that drops ends the update with the reason. The blob that ran runs on, and
-/// sound hardware takes another update. With a low supply no further operation is done.
+/// Flash that reports an error or a supply that drops ends the update with the reason. The blob that ran runs on,
+/// and sound hardware takes another update. With a low supply no further operation is done.
 pub fn hardware_that_fails(bench: &Bench) {
-    let operations = operations(bench);
-    let other_slot = BYTES / 8;
-    let fixed = [
-        Failure::Reported(0),
-        Failure::Reported(50),
-        Failure::Stuck(other_slot + 50),
-    ];
     // Without its seal the blob counts, and a start seals it.
-    let supply = (0..operations - 1).step_by(7).map(Failure::Supply);
-    for failure in fixed.into_iter().chain(supply) {
+    for at in (0..operations(bench) - 1).step_by(7) {
         let mut machine = bench.running(20);
-        set_failure(&mut machine, Some(failure));
+        machine.chip.supply_drops_at = Some(at);
         let (ended, _) = update(&mut machine, &plan(&bench.later));
-        match failure {
-            Failure::Supply(at) => {
-                assert_eq!(ended, Err(UpdateError::SupplyLow));
-                assert_eq!(machine.chip.flash.sectors.operations, at);
-                Seen::since_last(&mut machine);
-                let checks = Seen::after(&mut machine, 200).page(11);
-                assert_eq!(checks, Some(board_check::SUPPLY_LOW));
-            }
-            _ => assert_eq!(ended, Err(UpdateError::StoreFailed), "{failure:?}"),
-        }
+        assert_eq!(ended, Err(UpdateError::SupplyLow));
+        assert_eq!(machine.chip.flash.sectors.operations, at);
+        Seen::since_last(&mut machine);
+        let checks = Seen::after(&mut machine, 200).page(11);
+        assert_eq!(checks, Some(board_check::SUPPLY_LOW));
         assert_eq!(running(&mut machine), bench.blob);
-        set_failure(&mut machine, None);
+        machine.chip.supply_drops_at = None;
         machine.power_cycle();
         machine.run_ticks(20);
-        assert_eq!(running(&mut machine), bench.blob, "{failure:?}");
+        assert_eq!(running(&mut machine), bench.blob, "{at}");
         updated(&mut machine, &plan(&bench.later));
     }
+    let mut machine = bench.running(20);
+    machine.chip.flash.sectors.reports = Some(50);
+    let (ended, _) = update(&mut machine, &plan(&bench.later));
+    assert_eq!(ended, Err(UpdateError::StoreFailed));
+    assert_eq!(running(&mut machine), bench.blob);
 }
 
 /// Cuts of the power before, inside and after operations of the flash, and again in the start that follows:
