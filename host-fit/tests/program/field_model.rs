@@ -86,9 +86,6 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
             "{judged:?} {field:?}"
         );
     }
-
-    bench.good("export p.bin --format bin --address 0x08010000 --out flash.bin");
-    assert_eq!(bench.read("flash.bin"), bench.read("p.bin"));
 }
 
 #[test]

@@ -1,7 +1,6 @@
-//! Bad rows in a log, and how far a blob can be trusted: losses, uncertainty of
-//! poses, the difference between blobs.
+//! Bad rows in a log: losses; the difference between blobs.
 
-use crate::common::{Bench, changed, number, rows, stderr, stdout, thinned_log, unzipped};
+use crate::common::{Bench, changed, number, stderr, stdout, thinned_log, unzipped};
 use host_fit::input::shipped::{RUN_GZ, SERVICE_GZ};
 
 const HALL_CODES_IN_50_UM: i64 = 800;
@@ -84,48 +83,6 @@ fn a_log_of_which_a_tenth_is_wrong_is_refused_with_the_place() {
     assert!(!bench.has("p.bin"));
     bench.bad("check inverted.csv", 4, &parts);
     bench.good(&format!("{fit} --force"));
-}
-
-/// 95 % of the errors against the truth lie within 1.96 standard uncertainties.
-#[test]
-fn poses_come_with_an_uncertainty_that_covers_their_errors() {
-    let bench = bench();
-    let decode = "decode clean.bin service.csv.gz";
-    bench.good(&format!("{decode} --out with.csv --uncertainty"));
-    bench.good(&format!("{decode} --out without.csv"));
-    let (with, without) = (bench.text("with.csv"), bench.text("without.csv"));
-    let service = unzipped(SERVICE_GZ);
-    assert!(service.contains(",x_m,y_m,rz_rad,"));
-    for (with, without) in with.lines().zip(without.lines()) {
-        assert!(with.starts_with(without) && with[without.len()..].starts_with(','));
-    }
-    let (poses, truth) = (rows(&with), rows(&service));
-    let mut within = [0.0; 3];
-    for (pose, truth) in poses.iter().zip(&truth) {
-        for (axis, within) in within.iter_mut().enumerate() {
-            let error = pose[2 + axis] - truth[2 + axis] * 1e6;
-            *within += f64::from(u8::from(error.abs() <= 1.96 * pose[9 + axis]));
-        }
-    }
-    for (axis, within) in within.into_iter().enumerate() {
-        let share = within / poses.len() as f64;
-        assert!((0.93..0.97).contains(&share), "{axis}: {share}");
-    }
-    // Model (31) does not know, and neither does a blob without its posterior.
-    bench.good("fit run.csv --out 31.bin --model 31");
-    let to = "service.csv.gz --out u.csv --uncertainty";
-    bench.bad(
-        &format!("decode 31.bin {to}"),
-        3,
-        &["model (31)", "--model field"],
-    );
-    bench.write("alone.bin", bench.read("clean.bin"));
-    bench.bad(
-        &format!("decode alone.bin {to}"),
-        3,
-        &["alone.bin.posterior"],
-    );
-    assert!(!bench.has("u.csv"));
 }
 
 #[test]

@@ -46,18 +46,16 @@ fn check(import: &Import, what: &str) -> usize {
 fn frames_that_come_late_all_at_once_with_or_without_a_loss_shift_no_row() {
     for late in [16u32, 33, 50] {
         for lost in [0, 15, 16, 17, 32] {
-            for start in [200, 205, 211] {
-                // The recorder sleeps for `late` ticks; then it gets what its buffer kept: the first.
-                let end = start + late;
-                let bus = candump(|n, _| {
-                    let is_lost = (end.saturating_sub(lost)..end).contains(&n);
-                    let is_late = (start..end).contains(&n);
-                    (!is_lost).then(|| jittered_us(if is_late { end } else { n }))
-                });
-                let what = format!("{late} late, {lost} lost, from {start} on");
-                let import = files(&bus, &reference());
-                assert!(check(&import, &what) > 650, "{what}");
-            }
+            // The recorder sleeps for `late` ticks; then it gets what its buffer kept: the first.
+            let start = 200 + lost % 12;
+            let end = start + late;
+            let bus = candump(|n, _| {
+                let is_lost = (end.saturating_sub(lost)..end).contains(&n);
+                let is_late = (start..end).contains(&n);
+                (!is_lost).then(|| jittered_us(if is_late { end } else { n }))
+            });
+            let what = format!("{late} late, {lost} lost, from {start} on");
+            assert!(check(&files(&bus, &reference()), &what) > 650, "{what}");
         }
     }
 }
@@ -78,7 +76,7 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
 #[test]
 fn a_recorder_whose_clock_is_set_shifts_no_row() {
     for step_us in [50_000.0, 3e6, -1_500_000.0] {
-        for start in [200, 300, 500, 700] {
+        for start in [200, 500] {
             let bus = candump(|n, _| Some(jittered_us(n) + if n < start { 0.0 } else { step_us }));
             let what = format!("{step_us} us from {start} on");
             let import = files(&bus, &reference());

@@ -1,8 +1,6 @@
 use super::*;
 use crate::solve::search::cost::known::{KnownFunction, rastrigin, rosenbrock, sphere};
 use crate::solve::search::random::{Phase, stream};
-use hallstage_input::stage::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Generations for so many evaluations.
 fn options(seed: u64, population: usize, evaluations: usize) -> SearchOptions<'static> {
@@ -62,46 +60,6 @@ fn the_path_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// A function with its minimum outside the box. It counts its evaluations.
-struct Counted {
-    bounds: [Range; 3],
-    inside: AtomicUsize,
-    outside: AtomicUsize,
-}
-
-impl CostFunction for Counted {
-    fn bounds(&self) -> &[Range] {
-        &self.bounds
-    }
-    fn cost(&self, x: &[f64]) -> f64 {
-        let mut places = x.iter().zip(&self.bounds);
-        let count = match places.all(|(x, range)| range.contains(*x)) {
-            true => &self.inside,
-            false => &self.outside,
-        };
-        count.fetch_add(1, Ordering::Relaxed);
-        x.iter().map(|x| (x - 10.0) * (x - 10.0)).sum()
-    }
-}
-
-#[test]
-fn no_candidate_leaves_the_bounds_and_all_are_counted() {
-    for kind in SearchKind::ALL {
-        let function = Counted {
-            bounds: [(-1.0, 1.0), (0.0, 0.1), (2.0, 3.0)].map(|(low, high)| Range { low, high }),
-            inside: AtomicUsize::new(0),
-            outside: AtomicUsize::new(0),
-        };
-        let found = kind.minimize(&function, &options(2, 20, 2_000));
-        assert_eq!(function.outside.into_inner(), 0, "{}", kind.name());
-        let inside = function.inside.into_inner();
-        assert_eq!(found.evaluations, inside, "{}", kind.name());
-        let corner = found.best.iter().zip([1.0, 0.1, 3.0]);
-        let is_there = { corner }.all(|(x, best)| (x - best).abs() < 1e-2);
-        assert!(is_there, "{}: {:?}", kind.name(), found.best);
-    }
-}
-
 #[test]
 fn nan_costs_are_counted_and_never_win() {
     let hole = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { sphere(x) };
@@ -115,19 +73,5 @@ fn nan_costs_are_counted_and_never_win() {
         let lost = kind.minimize(&all, &options(4, 30, 300));
         let is_counted = lost.cost.is_nan() && lost.nan_costs == lost.evaluations;
         assert!(is_counted, "{}", kind.name());
-    }
-}
-
-#[test]
-fn a_warm_start_is_never_worse_than_what_it_starts_from() {
-    let function = KnownFunction::new(5, -3.0, 3.0, rosenbrock);
-    let known = vec![vec![1.0, 1.0, 1.0, 1.0, 1.001], vec![0.0; 4]];
-    for kind in SearchKind::ALL {
-        let start = SearchOptions {
-            first: &known,
-            ..options(1, 20, 200)
-        };
-        let found = kind.minimize(&function, &start);
-        assert!(found.cost <= rosenbrock(&known[0]), "{}", kind.name());
     }
 }
