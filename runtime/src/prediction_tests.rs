@@ -105,24 +105,6 @@ proptest! {
 }
 
 #[test]
-fn the_noise_that_it_adds_is_what_its_documentation_says() {
-    // White noise: the root of the sum of the squares of what each pose contributes.
-    for (age_us, percent) in [(300, 1.3), (1_000, 4.4)] {
-        let squares = (0..8).map(|noisy| {
-            let pose = |k| [if k == noisy { 1.0 } else { 0.0 }, 0.0, 0.0];
-            let predictor = fed(&every_2_ms(14_000, pose));
-            predictor
-                .pose_at(14_000 + age_us)
-                .expect("eight")
-                .x_m
-                .powi(2)
-        });
-        let added = (squares.sum::<f32>().sqrt() - 1.0) * 100.0;
-        assert!((added - percent).abs() < 0.1, "{added} % at {age_us} us");
-    }
-}
-
-#[test]
 fn there_is_none_before_eight_poses_nor_at_another_time() {
     let samples = every_2_ms(14_000, |_| [1e-6; 3]);
     assert_eq!(fed(&[]).pose_at(0), None);
