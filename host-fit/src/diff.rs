@@ -12,7 +12,7 @@
 //! ```
 
 use crate::report::figure::{Group, Item, bare, group, micro};
-use crate::report::parameters::{parameters_in, temperature_parameters_in};
+use crate::report::parameters::{motion_parameters_in, parameters_in, temperature_parameters_in};
 use crate::report::table::Table;
 use hallstage_input::axis::{AXES, Axis};
 use hallstage_solver::estimator::terms::names;
@@ -27,13 +27,23 @@ use std::collections::BTreeMap;
 const LEVELS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Steps towards the codes of a pose. Each step reduces the distance to a tenth or less.
 const STEPS: u32 = 6;
-/// The parameters of both blobs by name, with k and h of the temperatures, SI: values `a` and `b`, null where the model has
+/// The parameters of both blobs by name, with k and h of the temperatures and A and L of the motion, SI: values `a` and `b`, null where the model has
 /// no such term; the change; and `sigma`, the change over the standard error of a difference between independent logs, null
 /// unless both `errors` (SI, by name) are known.
 pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Group {
-    let [in_a, in_b] = sets.map(|set| {
-        let mut all = parameters_in(set);
-        all.extend(temperature_parameters_in(set));
+    let motion = sets.map(motion_parameters_in);
+    let [of_motion, other] = &motion;
+    let of_motion = if of_motion.is_empty() {
+        other
+    } else {
+        of_motion
+    }
+    .iter();
+    let of_motion: Vec<_> = of_motion.map(|(name, _)| name.clone()).collect();
+    let [in_a, in_b] = [0, 1].map(|k| {
+        let mut all = parameters_in(sets[k]);
+        all.extend(temperature_parameters_in(sets[k]));
+        all.extend(motion[k].iter().cloned());
         all
     });
     let change = |name: String| {
@@ -51,7 +61,7 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
         };
         (name, figures.into())
     };
-    let names = names(usize::MAX).into_iter();
+    let names = names(usize::MAX).into_iter().chain(of_motion);
     let names = names.filter(|name| in_a.contains_key(name) || in_b.contains_key(name));
     Group(names.map(change).collect())
 }

@@ -99,6 +99,24 @@ fn matrices(set: &ParameterSet) -> Vec<Table> {
         let per_k = c.temperature.per_mk.map(|row| row.map(|x| x * 1e3));
         all.push(matrix("temperature", PROBES, ["k, 1/K", "h, 1/K"], &per_k));
     }
+    if let Some(motion) = &set.motion_correction {
+        let (a, v) = (
+            ["X, m/s2", "Y, m/s2", "Rz, rad/s2"],
+            ["X, m/s", "Y, m/s", "Rz, rad/s"],
+        );
+        all.push(matrix(
+            "correction by acceleration",
+            PLANAR,
+            a,
+            &motion.acceleration_s2,
+        ));
+        all.push(matrix(
+            "correction by velocity",
+            PLANAR,
+            v,
+            &motion.velocity_s,
+        ));
+    }
     all
 }
 
@@ -157,6 +175,11 @@ fn figures(set: &ParameterSet, errors_per_k: Option<Value>) -> Group {
             temperature.set("standard_errors_per_k", errors);
         }
         figures.set("temperature", temperature);
+    }
+    if let Some(motion) = &set.motion_correction {
+        let motion =
+            json!({ "acceleration_s2": motion.acceleration_s2, "velocity_s": motion.velocity_s });
+        figures.set("motion_correction", motion);
     }
     figures
 }

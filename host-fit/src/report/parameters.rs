@@ -2,7 +2,7 @@
 
 use super::figure::{Figure, Group, bare, figure, group};
 use super::table::Table;
-use hallstage_input::axis::PROBES;
+use hallstage_input::axis::{AXES, PROBES};
 use hallstage_input::stage::{Stage, paper_signs};
 use hallstage_solver::estimator::model::{COUNT, Model, ParameterId};
 use hallstage_solver::estimator::paper::Parameters;
@@ -100,6 +100,34 @@ pub fn temperature_parameters_in(set: &ParameterSet) -> BTreeMap<String, Paramet
     };
     let named = names.into_iter().zip(temperature.per_mk.as_flattened());
     named.map(one).filter(|_| temperature.is_used()).collect()
+}
+
+/// A and L of the motion correction, where a blob has one, by name.
+pub fn motion_parameters_in(set: &ParameterSet) -> Vec<(String, Parameter)> {
+    let motion = set.motion_correction.iter();
+    let matrices = motion.flat_map(|motion| {
+        [
+            ("A", motion.acceleration_s2, ["s2", "m s2", "s2/m"]),
+            ("L", motion.velocity_s, ["s", "m s", "s/m"]),
+        ]
+    });
+    let mut all = Vec::new();
+    for (letter, matrix, [unit, by_rz, of_rz]) in matrices {
+        for (k, &value) in matrix.as_flattened().iter().enumerate() {
+            let (row, column) = (&AXES[k / 3], &AXES[k % 3]);
+            let parameter = Parameter {
+                value: value.into(),
+                unit: match (row.key == "rz", column.key == "rz") {
+                    (true, false) => of_rz,
+                    (false, true) => by_rz,
+                    _ => unit,
+                },
+                standard_error: None,
+            };
+            all.push((format!("{letter}_{}_{}", row.key, column.key), parameter));
+        }
+    }
+    all
 }
 
 /// A table with a row for each term, and with the given columns for each probe. `figures` gives them for a parameter by

@@ -1,6 +1,6 @@
 //! Outputs: whole or not at all, never in the place of an input, and nothing but them on standard output.
 
-use crate::common::{Bench, log, says, stderr, stdout, with_cell};
+use crate::common::{Bench, log, number, says, stderr, stdout, with_cell};
 use host_fit::output::blob_file;
 
 #[test]
@@ -138,4 +138,34 @@ fn errors_of_a_fit_that_cannot_be_are_unknown() {
     assert!(errors["x"]["rmse_um"].is_null() && errors["y"]["rmse_um"].is_null());
     let compared = stdout(&bench.good("diff p.bin p.bin"));
     assert!(!compared.contains("inf"), "{compared}");
+}
+
+#[test]
+fn inspect_and_diff_show_a_motion_correction() {
+    let bench = Bench::new();
+    for blob in ["warm.bin", "motion.bin"] {
+        let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/examples");
+        std::fs::copy(format!("{examples}/{blob}"), bench.path(blob)).expect("an example");
+    }
+    let inspected = bench.figures("inspect motion.bin");
+    assert_eq!(inspected["layout_version"], 4);
+    let motion = &inspected["motion_correction"];
+    let is = |value: &serde_json::Value, expected: f64| {
+        assert!(
+            (number(value) - expected).abs() <= 1e-6 * expected.abs(),
+            "{value}"
+        );
+    };
+    is(&motion["acceleration_s2"][2][0], -1.5e-5);
+    is(&motion["velocity_s"][2][1], 1.4e-3);
+    let without = bench.figures("inspect warm.bin");
+    assert!(without["motion_correction"].is_null());
+    for blobs in ["warm.bin motion.bin", "motion.bin warm.bin"] {
+        let compared = bench.figures(&format!("diff {blobs}"));
+        let of_rz = &compared["parameters"]["A_rz_x"];
+        assert_eq!(of_rz["unit"], "s2/m");
+        let known = if of_rz["a"].is_null() { "b" } else { "a" };
+        is(&of_rz[known], -1.5e-5);
+        is(&compared["pose_difference"]["axes"]["x"]["peak_um"], 0.0);
+    }
 }

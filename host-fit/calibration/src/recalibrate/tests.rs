@@ -17,7 +17,7 @@ use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use nalgebra::Vector3;
 use runtime::parameters::Text;
-use runtime::{ModelKind, ParameterSet};
+use runtime::{ModelKind, MotionCorrection, ParameterSet};
 
 const SEED: u64 = 2;
 const RUN: [f64; 6] = [5.0, 8.0, 7.0, 6.0, 4.0, 7.5];
@@ -55,7 +55,13 @@ impl Old {
         let fit = fit(&dataset, &stage, &settings).expect("a fit");
         Self {
             known: StoredPosterior::from_fit(&fit).expect("of the field model"),
-            set: fit.set,
+            set: ParameterSet {
+                motion_correction: Some(MotionCorrection {
+                    velocity_s: [[1e-4, 0.0, 0.0]; 3],
+                    ..MotionCorrection::default()
+                }),
+                ..fit.set
+            },
             stage,
             assembly,
         }
@@ -76,7 +82,10 @@ impl Old {
     ) -> Result<Recalibration, RecalibrateError> {
         let dataset = log(&self.stage, now, sines(run.0, run.1), SEED + 100);
         let known = Some(&self.known);
-        recalibrate(&self.set, known, &dataset, &self.stage, change, Text::new())
+        let new = recalibrate(&self.set, known, &dataset, &self.stage, change, Text::new())?;
+        let kept = (self.set.motion_correction, self.set.layout_version());
+        assert_eq!((new.set.motion_correction, new.set.layout_version()), kept);
+        Ok(new)
     }
 
     /// Errors in service of the changed stage over the noise floor, worst axis: with the old blob
