@@ -263,6 +263,22 @@ typedef struct {
   uint32_t opaque[HALL_PREDICTOR_WORDS];
 } HallPredictor;
 
+// A and L of a stage: q' = q + A a + L v.
+typedef struct {
+  // A: rows X, Y, Rz in m, m, rad per m/s2, m/s2, rad/s2 of acceleration.
+  float acceleration_s2[3][3];
+  // L: rows X, Y, Rz in m, m, rad per m/s, m/s, rad/s of velocity.
+  float velocity_s[3][3];
+} HallMotionCorrection;
+
+// Commanded velocity and acceleration of X, Y, Rz at the instant of a pose.
+typedef struct {
+  // Of X, Y, Rz: m/s, m/s, rad/s.
+  float velocity[3];
+  // Of X, Y, Rz: m/s2, m/s2, rad/s2.
+  float acceleration[3];
+} HallPlanarMotion;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -343,6 +359,26 @@ HALL_NODISCARD
 bool hall_predict(const HallPredictor *predictor,
                   uint32_t time_us,
                   HallPlanarPose *pose);
+
+// Reads the motion correction of the parameter blob at the start of `memory`, which is checked as by
+// hall_load; zeros where the blob has none. Unless the result is HALL_RESULT_OK, the correction is
+// unchanged.
+//
+// # Safety
+// `memory` points to `length` readable bytes; `correction` is NULL or points to memory for one.
+HALL_NODISCARD
+HallResult hall_load_motion_correction(const uint8_t *memory,
+                                       size_t length,
+                                       HallMotionCorrection *correction);
+
+// The pose without the errors that follow the commanded motion. The trajectory generator gives
+// velocity and acceleration, for the sample of the pose. `false`, and zeros, for a null pointer and
+// where the pose or the command is NaN or infinite.
+HALL_NODISCARD
+bool hall_correct_motion(const HallMotionCorrection *correction,
+                         HallPlanarPose pose,
+                         const HallPlanarMotion *commanded,
+                         HallPlanarPose *corrected);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -12,22 +12,22 @@
 //!
 //! The trajectory generator gives v and a, for the instant of the pose. Derivatives of measured poses are
 //! too late or too noisy. The README shows the cost of a late command.
+//!
+//! ```
+//! use runtime::motion::{MotionCorrection, PlanarMotion};
+//! use runtime::PlanarPose;
+//!
+//! // All probes read X 7 um too large per m/s2.
+//! let mut correction = MotionCorrection::default();
+//! correction.acceleration_s2[0][0] = -7e-6;
+//! let pose = PlanarPose { x_m: 14e-6, y_m: 0.0, rz_rad: 0.0 };
+//! let commanded = PlanarMotion { velocity: [0.0; 3], acceleration: [2.0, 0.0, 0.0] };
+//! assert_eq!(correction.correct(pose, &commanded), Some(PlanarPose::ZERO));
+//! ```
 
 use crate::pose::PlanarPose;
 
-/// A and L of a stage.
-///
-/// ```
-/// use runtime::motion::{MotionCorrection, PlanarMotion};
-/// use runtime::PlanarPose;
-///
-/// // All probes read X 7 um too large per m/s2.
-/// let mut correction = MotionCorrection::default();
-/// correction.acceleration_s2[0][0] = -7e-6;
-/// let pose = PlanarPose { x_m: 14e-6, y_m: 0.0, rz_rad: 0.0 };
-/// let commanded = PlanarMotion { velocity: [0.0; 3], acceleration: [2.0, 0.0, 0.0] };
-/// assert_eq!(correction.correct(pose, &commanded), Some(PlanarPose::ZERO));
-/// ```
+/// A and L of a stage: q' = q + A a + L v.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct MotionCorrection {

@@ -67,6 +67,34 @@ static int predicts(void)
     return 0;
 }
 
+/* A pose that a commanded acceleration changes. */
+static int corrects(void)
+{
+    const size_t length = (size_t)_parameter_slot_bytes;
+    HallMotionCorrection correction = { { { 1 } }, { { 1 } } };
+    HallPlanarMotion commanded = { { 0 }, { 2, 0, 0 } };
+    HallPlanarPose pose = { 1e-6f, 2e-6f, 3e-6f }, corrected;
+    const HallPlanarPose none = { 0, 0, 0 };
+    CHECK(hall_load_motion_correction(_parameter_slot_0, 100, &correction) == HALL_RESULT_TRUNCATED);
+    CHECK(correction.acceleration_s2[0][0] == 1);
+    CHECK(hall_load_motion_correction(NULL, length, &correction) == HALL_RESULT_NULL_POINTER);
+    CHECK(hall_load_motion_correction(_parameter_slot_0, length, NULL) == HALL_RESULT_NULL_POINTER);
+    /* This blob has no correction. */
+    CHECK(hall_load_motion_correction(_parameter_slot_0, length, &correction) == HALL_RESULT_OK);
+    CHECK(hall_correct_motion(&correction, pose, &commanded, &corrected));
+    CHECK(memcmp(&pose, &corrected, sizeof pose) == 0);
+    correction.acceleration_s2[2][0] = 1e-5f;
+    CHECK(hall_correct_motion(&correction, pose, &commanded, &corrected));
+    CHECK(corrected.rz_rad == 3e-6f + 1e-5f * 2 && corrected.x_m == pose.x_m);
+    CHECK(!hall_correct_motion(NULL, pose, &commanded, &corrected));
+    CHECK(!hall_correct_motion(&correction, pose, NULL, &corrected));
+    CHECK(!hall_correct_motion(&correction, pose, &commanded, NULL));
+    commanded.velocity[1] = __builtin_nanf("");
+    CHECK(!hall_correct_motion(&correction, pose, &commanded, &corrected));
+    CHECK(memcmp(&none, &corrected, sizeof none) == 0);
+    return 0;
+}
+
 static int run(void)
 {
     const size_t length = (size_t)_parameter_slot_bytes;
@@ -118,7 +146,7 @@ static int run(void)
     CHECK(again.status & HALL_STATUS_ZERO_SET);
     CHECK(hall_rezero_start(&servo, 249) == HALL_RESULT_OK);
     CHECK(hall_rezero_state(&servo) == HALL_REZERO_TOO_SHORT);
-    return predicts();
+    return (line = predicts()) != 0 ? line : corrects();
 }
 
 int main(void)

@@ -15,6 +15,7 @@ fn the_c_header_is_made_from_the_source() {
         "src/storage.rs",
         "src/types.rs",
         "../src/frame.rs",
+        "../src/motion.rs",
         "../src/tracker.rs",
     ] {
         builder = builder.with_src(folder.join(source));

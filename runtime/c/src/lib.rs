@@ -15,7 +15,8 @@ use core::mem::MaybeUninit;
 use runtime::tracker::Health;
 use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{
-    AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame, Reading,
+    AnyDecoder, BlobError, MotionCorrection, OnInvalid, ParameterSet, PlanarMotion, PoseTracker,
+    Predictor, RawFrame, Reading,
 };
 pub use storage::{HallDecoder, HallPredictor, HallServo};
 pub use types::{HALL_RUNTIME_VERSION, HallPlanarPose, HallReading, HallResult, HallRezero};
@@ -231,6 +232,53 @@ pub extern "C" fn hall_predict(
     let predicted = predicted.and_then(|predictor| predictor.pose_at(time_us));
     pose.write(predicted.map_or(HallPlanarPose::ZERO, HallPlanarPose::from));
     predicted.is_some()
+}
+
+/// Reads the motion correction of the parameter blob at the start of `memory`, which is checked as by
+/// hall_load; zeros where the blob has none. Unless the result is HALL_RESULT_OK, the correction is
+/// unchanged.
+///
+/// # Safety
+/// `memory` points to `length` readable bytes; `correction` is NULL or points to memory for one.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hall_load_motion_correction(
+    memory: *const u8,
+    length: usize,
+    correction: Option<&mut MaybeUninit<MotionCorrection>>,
+) -> HallResult {
+    let Some(correction) = correction.filter(|_| !memory.is_null()) else {
+        return HallResult::NullPointer;
+    };
+    // SAFETY: not null, and `length` bytes long as the caller promises.
+    let memory = unsafe { core::slice::from_raw_parts(memory, length) };
+    match ParameterSet::from_flash(memory) {
+        Ok(set) => {
+            correction.write(set.motion_correction.unwrap_or_default());
+            HallResult::Ok
+        }
+        Err(error) => error.into(),
+    }
+}
+
+/// The pose without the errors that follow the commanded motion. The trajectory generator gives
+/// velocity and acceleration, for the sample of the pose. `false`, and zeros, for a null pointer and
+/// where the pose or the command is NaN or infinite.
+#[must_use]
+#[unsafe(no_mangle)]
+pub extern "C" fn hall_correct_motion(
+    correction: Option<&MotionCorrection>,
+    pose: HallPlanarPose,
+    commanded: Option<&PlanarMotion>,
+    corrected: Option<&mut MaybeUninit<HallPlanarPose>>,
+) -> bool {
+    let Some(corrected) = corrected else {
+        return false;
+    };
+    let found = correction.zip(commanded);
+    let found = found.and_then(|(correction, motion)| correction.correct(pose.into(), motion));
+    corrected.write(found.map_or(HallPlanarPose::ZERO, HallPlanarPose::from));
+    found.is_some()
 }
 
 /// The servo that C points to, if it was started.
