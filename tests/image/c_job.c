@@ -8,6 +8,7 @@
 
 static HallDecoder decoder;
 static HallServo servo;
+static HallMotionCorrection correction;
 static uint8_t blob[728];
 static uint32_t frames[256][9];
 static HallReading readings[256];
@@ -25,6 +26,27 @@ static int all(ssize_t (*transfer)(int, void *, size_t), int file, void *bytes, 
     return 1;
 }
 
+/* The motion of tests/src/job.rs. */
+static float number(int32_t code, uint32_t sequence)
+{
+    union { uint32_t word; float number; } any = { .word = (uint32_t)code << 16 };
+    return sequence % 64 == 0 ? any.number : (float)code * 1e-4f;
+}
+
+static void correct(HallReading *reading, const HallFrame *frame)
+{
+    HallPlanarMotion commanded;
+    HallPlanarPose pose = { reading->x_m, reading->y_m, reading->rz_rad };
+    for (int k = 0; k < 3; k++) {
+        commanded.velocity[k] = number(frame->hall[k], frame->sequence);
+        commanded.acceleration[k] = number(frame->capacitive[k], frame->sequence);
+    }
+    (void)!hall_correct_motion(&correction, pose, &commanded, &pose);
+    reading->x_m = pose.x_m;
+    reading->y_m = pose.y_m;
+    reading->rz_rad = pose.rz_rad;
+}
+
 static ssize_t put(int file, void *bytes, size_t length) { return write(file, bytes, length); }
 
 int main(void)
@@ -39,6 +61,8 @@ int main(void)
             return 3;
         if (hall_load(blob, length, NULL, &decoder) != HALL_RESULT_OK)
             return 4;
+        if (hall_load_motion_correction(blob, length, &correction) != HALL_RESULT_OK)
+            return 8;
         if (hall_servo_start(&servo, &decoder, (uint16_t)head[2]) != HALL_RESULT_OK)
             return 7;
         for (uint32_t left = head[1]; left > 0;) {
@@ -50,6 +74,8 @@ int main(void)
                 memcpy(&frame, frames[k], 7 * sizeof frames[k][0]);
                 memcpy(frame.temperature_mc, &frames[k][7], sizeof frame.temperature_mc);
                 hall_tick(&servo, &frame, &readings[k]);
+                if (correction.acceleration_s2[0][0] != 0)
+                    correct(&readings[k], &frame);
             }
             if (!all(put, words, readings, now * sizeof readings[0]))
                 return 6;

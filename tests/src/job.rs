@@ -10,14 +10,14 @@
 //! | 9 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number, temperatures of mount and body |
 //!
 //! A blob is loaded as from flash and run by a servo; in a section of [`PREDICTED`] a [`Predictor`]
-//! gives X, Y, Rz. This file is compiled into the host's tool and into the image, so it uses `core` only.
+//! gives X, Y, Rz. With a motion correction they are corrected by a motion that follows from the codes. This file is compiled into the host's tool and into the image, so it uses `core` only.
 
 #[path = "job_run.rs"]
 mod run;
 
 pub use run::{Stop, Transfer, run};
 
-use runtime::{OnInvalid, PlanarPose, PoseTracker, Predictor, RawFrame, Reading};
+use runtime::{OnInvalid, PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading};
 
 /// Source: a parameter blob.
 pub const BLOB: u32 = 2;
@@ -109,6 +109,18 @@ impl PredictingTracker {
         let at_us = time_us.wrapping_add(k.wrapping_mul(193) % 4_500);
         reading.pose.planar = self.predictor.pose_at(at_us).unwrap_or(PlanarPose::ZERO);
         reading
+    }
+}
+
+/// A commanded motion made of a frame's codes: up to 3 m/s, m/s2, and in one tick of 64 any words.
+pub fn motion(frame: &RawFrame) -> PlanarMotion {
+    let number = |code: i32| match frame.sequence % 64 {
+        0 => f32::from_bits((code as u32) << 16),
+        _ => code as f32 * 1e-4,
+    };
+    PlanarMotion {
+        velocity: frame.hall.map(number),
+        acceleration: frame.capacitive.map(number),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::{
     ANSWER_WORDS, BLOB_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PREDICTED, PredictingTracker, answer,
-    frame,
+    frame, motion,
 };
-use runtime::{BlobError, ParameterSet, PoseTracker, RawFrame, Reading};
+use runtime::{BlobError, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading};
 
 /// Frames of one transfer.
 const BATCH: usize = 512;
@@ -64,9 +64,16 @@ pub fn run<T: Transfer>(transfer: &mut T) -> Result<(), Stop<T::Fault>> {
         let set = ParameterSet::from_flash(blob).map_err(Stop::Refused)?;
         let mut tracker = PoseTracker::new(set.decoder(), head.on_invalid());
         let mut predicting = PredictingTracker::new(tracker.clone());
-        frames(transfer, head.frames, |frame| match head.source {
-            PREDICTED => predicting.tick(frame),
-            _ => tracker.tick(frame),
+        frames(transfer, head.frames, |frame| {
+            let mut reading = match head.source {
+                PREDICTED => predicting.tick(frame),
+                _ => tracker.tick(frame),
+            };
+            if let Some(correction) = set.motion_correction {
+                let corrected = correction.correct(reading.pose.planar, &motion(frame));
+                reading.pose.planar = corrected.unwrap_or(PlanarPose::ZERO);
+            }
+            reading
         })?;
     }
 }

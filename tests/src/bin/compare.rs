@@ -58,9 +58,9 @@ struct Make {
     unpredicted: bool,
 }
 
-/// Examples of the field model: each of its terms is there, and temperatures in the second.
+/// Examples of the field model: each of its terms is there; temperatures and a motion correction in the second.
 const FIELD_MODEL: &[u8] = include_bytes!("../../../runtime/examples/field.bin");
-const WARM: &[u8] = include_bytes!("../../../runtime/examples/warm.bin");
+const MOTION: &[u8] = include_bytes!("../../../runtime/examples/motion.bin");
 /// Longest hold of an invalid value, ticks.
 const HOLD: u16 = 3;
 
@@ -94,11 +94,12 @@ fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
     let rows = dataset.rows.len();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let field_set = ParameterSet::from_bytes(FIELD_MODEL)?;
-    let temperature = ParameterSet::from_bytes(WARM)?.constants.temperature;
+    let moving = ParameterSet::from_bytes(MOTION)?;
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
         let mut warm = set.clone();
-        warm.constants.temperature = temperature;
+        warm.constants.temperature = moving.constants.temperature;
+        warm.motion_correction = moving.motion_correction;
         let mut buffer = [0; MAX_BYTES];
         let blob = warm.to_bytes(&mut buffer)?;
         let frames = motion::uniform_frames(&mut rng, codes / 2);
