@@ -166,7 +166,7 @@ fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
     stiff.motion.axes[4].speed = 1e-6;
     let message = plan(&stiff, SECONDS).expect_err("refused").to_string();
     assert!(
-        message.contains("cannot move rx by 480.0 urad"),
+        message.contains("cannot move rx by 480.0 µrad"),
         "{message}"
     );
 }
