@@ -1,8 +1,8 @@
 //! Every fault of a bus is noticed within one tick, wherever it falls, and no whole tick has codes that were not
-//! sent; silence is noticed within 4 ms.
+//! sent.
 
 use hal_adapters::can::{
-    BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Taken, Timing, sensor,
+    BusFrame, Layout, Message, SensorReceiver, StampedFrame, Taken, Timing, sensor,
 };
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
@@ -152,28 +152,4 @@ fn each_injected_fault_is_noticed_within_one_tick() {
         println!("RESULT fault={fault:?} worst_notice_us={worst}");
         assert!(worst <= PERIOD_US, "{fault:?}: {worst} us");
     }
-}
-
-#[test]
-fn silence_is_stale_within_4_ms_of_the_last_frame_when_asked_every_millisecond() {
-    let mut worst_us = 0;
-    for phase_us in (0..1_000).step_by(7) {
-        let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
-        let frames = traffic(Layout::Bits16, 100, 120);
-        for f in &frames {
-            receiver.take(&f.frame, f.time_us as u32);
-        }
-        let last_us = frames.last().map(|f| f.time_us).expect("frames");
-        let mut now_us = last_us + phase_us;
-        while !matches!(
-            receiver.poll(now_us as u32).fault,
-            Some(BusFault::Stale { .. })
-        ) {
-            now_us += 1_000;
-            assert!(now_us < last_us + 10_000, "never stale");
-        }
-        worst_us = worst_us.max(now_us - last_us);
-    }
-    println!("RESULT stale_after_us_max={worst_us}");
-    assert!(worst_us <= 4_000);
 }

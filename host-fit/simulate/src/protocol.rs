@@ -228,25 +228,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn combined_and_service_start_at_rest_and_move_every_axis_in_their_own_way() {
-        let runs = [Protocol::Combined, Protocol::Service].map(|p| p.run(0.002, 1));
-        assert_ne!(runs[0].movements, runs[1].movements);
-        assert!(!runs[0].is_zero_exact && runs[1].is_zero_exact);
-        for run in &runs {
-            assert_eq!(run.movements.len(), 8);
-            for poses in &run.movements {
-                assert_eq!((poses.len(), poses[0]), (4000, StagePose::default()));
-                for (axis, amplitude) in COMBINED_AMPLITUDES.as_flattened().iter().enumerate() {
-                    let at = |pose: &StagePose| pose.to_array()[axis];
-                    let peak = |f: fn(f64, f64) -> f64| poses.iter().map(at).fold(0.0, f);
-                    let span = peak(f64::max) - peak(f64::min);
-                    assert!((span / amplitude - 2.0).abs() < 1e-3, "{span}");
-                }
-            }
-        }
-    }
-
     /// The longest move of Y: 0.8 mm in 60 ms, 2 pi d / T^2.
     #[test]
     fn fast_moves_reach_four_times_their_rms_acceleration() {

@@ -188,13 +188,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_stage_at_the_temperature_of_its_assembly_is_as_assembled() {
-        let assembly = Assembly::draw(&stage(), 3);
-        let same = Thermal::draw(3).warmed(&assembly, [ASSEMBLED_C; 2]);
-        assert_eq!(same, assembly);
-    }
-
     /// Remanence and gap with the mount, the element with the body: -0.11 %/K, and 226 per m of 0.4 um/K.
     #[test]
     fn sensitivities_follow_both_temperatures() {

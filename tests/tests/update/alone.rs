@@ -1,6 +1,6 @@
-//! One host: duration, a bad bus, faults, reports and refusals; and another that declares the servo on.
+//! One host: a bad bus, lost answers and refusals; and another that declares the servo on.
 
-use super::world::{World, flashed};
+use super::world::World;
 use super::{KEY, NEW, OLD, SERIAL, activating, changed, for_serial, plan, undeclared};
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::{UpdateRequest, blob_crc};
@@ -11,42 +11,6 @@ use tests::node::Node;
 
 const ACTIVATE: u8 = UpdateRequest::Activate.number();
 const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
-
-/// The largest blob of a fit: the field model, with texts of full length.
-fn largest() -> Vec<u8> {
-    changed(NEW, |set| {
-        set.serial = "S".repeat(32).as_str().try_into().expect("32 bytes");
-        let created = "2026-11-22T10:00:00.000000+00:00";
-        set.created = created.try_into().expect("32 bytes");
-    })
-}
-
-#[test]
-fn the_largest_blob_takes_less_than_one_second_and_a_half_on_a_loaded_bus() {
-    let blob = largest();
-    for key in [None, Some(KEY)] {
-        let serial: &'static str = "S".repeat(32).leak();
-        let mut world = World::new(key, &[], 1);
-        world.node = Node::new(Some(serial), key, flashed(&blob), 1);
-        world.other_asks(0, Request::Record { on: true }, 3);
-        let newer = changed(&blob, |set| set.fit.rows += 1);
-        let job = for_serial(Some(serial), plan(&newer));
-        let updated = world.update(&job).expect("it is stored");
-        assert_eq!((updated.sequence, updated.is_stored), (1, true));
-        assert_eq!((updated.repeated_words, updated.repeated_transfers), (0, 0));
-        assert_eq!(world.newest(), newer);
-        println!(
-            "RESULT update_bytes={} key={} update_us={} frames={} overruns={}",
-            newer.len(),
-            key.is_some(),
-            world.now_us,
-            world.recording.len(),
-            world.overruns
-        );
-        assert!(world.now_us <= 1_500_000);
-        assert_eq!(world.overruns, 0);
-    }
-}
 
 #[test]
 fn on_a_bad_bus_the_update_ends_with_the_blob_bit_for_bit_or_a_refusal() {
@@ -84,31 +48,6 @@ fn on_a_bad_bus(rate: u64) -> [u32; 2] {
         }
     }
     ends
-}
-
-#[test]
-fn activated_parameters_run_are_reported_and_read_back() {
-    let mut world = World::new(Some(KEY), &[(Fault::Drop, 20_000)], 8);
-    let updated = world.update(&activating(plan(NEW))).expect("it is stored");
-    assert!(updated.is_active && world.node.resets() == 1);
-    let (before, _) = updated.before.running.expect("it ran");
-    assert_eq!((before.sequence, Some(before.crc)), (0, blob_crc(OLD)));
-    let read = on::read_back(&mut world.talk(), &mut |_, _| {});
-    let (identity, blob) = read.expect("it runs");
-    assert_eq!(blob, NEW);
-    assert_eq!(
-        (identity.serial.as_str(), identity.needs_key),
-        (SERIAL, true)
-    );
-    let (running, bytes) = identity.running.expect("it runs");
-    assert_eq!((running.sequence, identity.newest_sequence), (1, 1));
-    assert_eq!(bytes as usize, NEW.len());
-    assert_eq!(identity.program_version, [1, 2, 3]);
-    // The same blob is not sent again.
-    let mut again = undeclared(plan(NEW));
-    again.key = None;
-    let again = world.update(&again).expect("nothing to do");
-    assert_eq!((again.is_stored, again.is_active), (false, true));
 }
 
 #[test]

@@ -43,7 +43,6 @@ pub struct World {
     token: u8,
     /// Frames that the host has not received yet.
     heard: VecDeque<BusFrame>,
-    pub overruns: u32,
     /// Answers of the node that no host hears.
     pub loses: fn(&Answer) -> bool,
 }
@@ -63,7 +62,6 @@ impl World {
             interrupt_at: None,
             token: 8,
             heard: VecDeque::new(),
-            overruns: 0,
             loses: |_| false,
         }
     }
@@ -76,8 +74,6 @@ impl World {
         for frame in self.to_node.arrived(self.now_us) {
             if !is_deaf && self.fifo.len() < TAKEN_PER_TICK {
                 self.fifo.push_back(frame);
-            } else {
-                self.overruns += u32::from(!is_deaf);
             }
         }
         if self.now_us / TICK_US > tick_before && !is_deaf && self.node.tick(0, self.fifo.drain(..))

@@ -123,28 +123,6 @@ fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
 }
 
 #[test]
-fn without_a_key_the_line_must_say_off_for_all_that_moves_or_resets() {
-    for request in WITH_TAG {
-        for (line, is_obeyed) in [(Some(false), false), (Some(true), true), (None, true)] {
-            let mut bench = Bench::new(None);
-            bench
-                .service
-                .before_tick(None::<&mut runtime::PoseTracker>, line);
-            let (outcome, _) = bench.ask(request, 7);
-            let needs_declaration = matches!(request, Request::Update(_));
-            let is_refused = outcome == Outcome::ServoOn;
-            assert!(
-                is_obeyed != is_refused || needs_declaration,
-                "{request:?} {line:?}"
-            );
-        }
-    }
-    // Whoever says that the servo is on is believed.
-    let mut bench = Bench::new(Some(KEY));
-    assert_eq!(bench.ask(Request::ServoOff { seconds: 0 }, 7), DONE);
-}
-
-#[test]
 fn a_second_host_is_refused_as_busy_until_the_first_is_done_or_silent() {
     let mut bench = Bench::new(None);
     bench.servo_off();
