@@ -257,7 +257,6 @@ impl Calibration {
         residuals(
             py,
             dataset,
-            &self.designed,
             &errors,
             Some(&fit.fitted.weights_by_row(dataset)),
         )

@@ -109,7 +109,7 @@ impl Evaluation {
     /// Errors of the rows, zero deviations taken off, m, m, rad.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let of = &self.evaluated;
-        residuals(py, &of.log.dataset, &self.designed, &of.by_row, None)
+        residuals(py, &of.log.dataset, &of.by_row, None)
     }
 
     /// Writes the page that `host-fit eval --report` writes, to this file.

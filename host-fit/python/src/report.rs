@@ -8,7 +8,6 @@ use host_fit::input::finding::Finding;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::write_atomically;
-use host_fit::report::Density;
 use host_fit::report::errors::RowErrors;
 use host_fit::report::html::{Cause, Page};
 use host_fit::report::page::{Source, facts};
@@ -44,7 +43,6 @@ pub fn text(subject: &Subject, findings: &[Finding]) -> String {
 pub fn residuals<'py>(
     py: Python<'py>,
     dataset: &Dataset,
-    stage: &Designed,
     errors: &RowErrors,
     weights: Option<&[f64]>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -58,15 +56,8 @@ pub fn residuals<'py>(
         Some(weights) => PyArray1::from_slice(py, weights),
         None => PyArray1::from_vec(py, vec![1.0; errors.len()]),
     };
-    let period_s = dataset.period_s(0..dataset.rows.len());
-    let period_s = period_s.unwrap_or(stage.servo_period_s);
-    let density = Density::new(dataset, period_s, errors);
-    let (bin_hz, power) = density.map_or((0.0, Vec::new()), |density| {
-        let power = density.power.map(|power| PyArray1::from_vec(py, power));
-        (density.bin_hz, power.into())
-    });
     let class = py.import("hallstage._results")?.getattr("Residuals")?;
-    class.call1((time, movement, axes, weight, bin_hz, power))
+    class.call1((time, movement, axes, weight))
 }
 
 /// Who says what on a page.

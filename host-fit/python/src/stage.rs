@@ -1,11 +1,7 @@
 //! The stage as designed.
 
 use crate::error::{stage_error, wrong};
-use host_fit::input::axis::{AXES, PROBES};
 use host_fit::input::stage::Stage as Designed;
-use host_fit::report::figure::{Figure, bare, micro};
-use host_fit::report::table::Table;
-use host_fit::report::text::as_text;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBool, PyDict};
 use std::path::{Path, PathBuf};
@@ -22,6 +18,8 @@ use std::sync::Arc;
 #[pyclass(frozen, eq, module = "hallstage")]
 pub struct Stage {
     pub designed: Arc<Designed>,
+    /// The text of the file.
+    text: String,
     /// The file that it was read from.
     pub path: Option<PathBuf>,
 }
@@ -61,6 +59,7 @@ impl Stage {
         let designed = Designed::from_toml(&text, Path::new("Stage(...)"));
         Ok(Self {
             designed: Arc::new(designed.map_err(|error| stage_error(&error))?),
+            text,
             path: None,
         })
     }
@@ -73,6 +72,7 @@ impl Stage {
         let designed = Designed::from_file(&path).map_err(|error| stage_error(&error))?;
         Ok(Self {
             designed: Arc::new(designed),
+            text: std::fs::read_to_string(&path)?,
             path: Some(path),
         })
     }
@@ -113,32 +113,7 @@ impl Stage {
         self.designed.y_baseline_m
     }
 
-    fn __repr__(&self) -> String {
-        as_text(&self.tables())
-    }
-}
-
-impl Stage {
-    fn tables(&self) -> Vec<Table> {
-        let stage = &*self.designed;
-        let mm = |m: f64| bare(m * 1e3, "mm");
-        let mut sensors = Table::new("stage", &["x, mm", "y, mm", "µm per code", "codes"]);
-        let places = stage.places_m().into_iter().zip(PROBES);
-        let hall = places.map(|(place, name)| (format!("Hall probe {name}"), place, &stage.hall));
-        let places = stage.capacitive_probes_m.into_iter().zip(1..);
-        let gaps = places.map(|(place, k)| (format!("gap {k}"), place, &stage.capacitive));
-        for (name, [x, y], scale) in hall.chain(gaps) {
-            let window = format!("{} to {}", scale.window.low, scale.window.high);
-            let numbers = [x * 1e3, y * 1e3, scale.m_per_count * 1e6].map(Figure::from);
-            sensors.row(name, numbers.into_iter().chain([window.into()]));
-        }
-        let mut motion = Table::new("in service", &["to either side"]);
-        for (axis, moves) in AXES.iter().zip(&stage.motion.axes) {
-            motion.row(axis.key, [micro(axis, moves.service)]);
-        }
-        let mut others = Table::default();
-        others.row("Y beams apart", [mm(stage.y_baseline_m)]);
-        others.row("servo period", [bare(stage.servo_period_s * 1e3, "ms")]);
-        vec![sensors, motion, others]
+    fn __repr__(&self) -> &str {
+        &self.text
     }
 }

@@ -29,9 +29,7 @@ def test_a_stage_is_made_of_tables_as_of_a_file(stage: hs.Stage) -> None:
     tables["servo"]["period_s"] = 0.001
     other = hs.Stage(**tables)
     assert other != stage and other.servo_period_s == 0.001
-    shown = repr(stage)
-    for part in ["Hall probe A", "197.5", "gap 3", "servo period", "2 ms"]:
-        assert part in shown
+    assert "h1x_m = 0.1975" in repr(stage) and "period_s = 0.001" in repr(other)
 
 
 @pytest.mark.parametrize(

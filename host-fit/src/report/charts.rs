@@ -1,13 +1,11 @@
-//! The charts of a report: the errors over time, against pose, signals and temperatures; their spectrum.
+//! The charts of a report: the errors over time, against pose, signals and temperatures.
 
 use super::axis::Axis;
 use super::chart::{Chart, Mark, Tone};
 use super::errors::RowErrors;
 use super::series::{Column, band, columns};
-use hallstage_calibration::judge::spectrum::{Spectrum, windows};
 use hallstage_input::dataset::{Dataset, Row};
 use runtime::frame::MISSING_CODE;
-use std::ops::Range;
 
 /// Half the width of the band of the noise, standard deviations.
 const BAND: f64 = 2.0;
@@ -15,9 +13,6 @@ const BAND: f64 = 2.0;
 const MOVEMENTS_SHOWN: usize = 150;
 /// Intervals of a quantity that errors are shown against.
 const BINS: usize = 40;
-/// Longest and shortest window of the spectrum, rows.
-const WINDOW_MAX: usize = 4096;
-const WINDOW_MIN: usize = 32;
 
 /// A quantity of a row in um or urad, and its name.
 type Quantity = (&'static str, fn(&Row) -> f64);
@@ -130,43 +125,5 @@ impl Log<'_> {
         (QUANTITIES.iter().chain(&TEMPERATURES))
             .filter_map(chart)
             .collect()
-    }
-}
-
-/// Power spectral density of errors, mean over windows of equal length within the movements.
-#[derive(Clone, Debug)]
-pub struct Density {
-    /// Distance of the bins from 0 on, Hz.
-    pub bin_hz: f64,
-    /// One-sided, of X, Y, Rz: m²/Hz, m²/Hz, rad²/Hz.
-    pub power: [Vec<f64>; 3],
-}
-
-impl Density {
-    /// The density of errors by row of a dataset, m, m, rad, with this time between rows, s. Rows without a pose count
-    /// as zero. `None` where no movement is long enough.
-    pub fn new(dataset: &Dataset, period_s: f64, errors: &RowErrors) -> Option<Self> {
-        let movements: Vec<Range<usize>> = (dataset.movements.iter())
-            .map(|movement| movement.rows.clone())
-            .collect();
-        let longest = movements.iter().map(ExactSizeIterator::len).max()?;
-        let length = (1usize << longest.checked_ilog2()?).min(WINDOW_MAX);
-        if length < WINDOW_MIN {
-            return None;
-        }
-        let windows = windows(&movements, length);
-        let of_axis = |axis: usize| {
-            let of = |error: &Option<[f64; 3]>| error.map_or(0.0, |error| error[axis]);
-            let values: Vec<f64> = errors.iter().map(of).collect();
-            // One side of the spectrum; the sum of squares of the taper is 3/8 of its length.
-            let scale = 2.0 * period_s / (0.375 * length as f64);
-            let mut power = Spectrum::new(&values, &windows).power;
-            power.iter_mut().for_each(|power| *power *= scale);
-            power
-        };
-        Some(Self {
-            bin_hz: 1.0 / (length as f64 * period_s),
-            power: [0, 1, 2].map(of_axis),
-        })
     }
 }

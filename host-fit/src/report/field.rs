@@ -1,15 +1,9 @@
-//! Figures of a fit of the field model: noise, uncertainty of the pose, correlations.
+//! Figures of a fit of the field model: noise and uncertainty of the pose; correlations.
 
 use super::errors::pose;
 use super::figure::{Figure, Group, figure, group};
 use hallstage_solver::estimator::field::FieldFigures;
 use hallstage_solver::estimator::posterior::{PoseUncertainty, Posterior};
-
-/// Pairs and directions that are reported.
-const PAIRS: usize = 10;
-const DIRECTIONS: usize = 3;
-/// Parameters named of a direction.
-const PARTS: usize = 4;
 
 /// Two parameters that stand in for each other, and their correlation, from -1 to 1.
 pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Group {
@@ -17,25 +11,15 @@ pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Group 
     group! { "parameters" => both, "correlation" => *correlation }
 }
 
-/// White noise of the probes A, B, C; the random walk of the reference, which grows with the root of time; the uncertainty
-/// of a pose by the parameters (the same at every visit) and by the noise of the probes (new in every servo period); the
-/// strongest correlations; and the combinations of parameters that the log determines worst, with their variance over that
-/// of independent parameters and the largest shares in terms of standard errors.
+/// White noise of the probes A, B, C; the random walk of the reference, which grows with the root of time; and the
+/// uncertainty of a pose by the parameters (the same at every visit) and by the noise of the probes (new in every servo
+/// period).
 pub fn figures(fit: &FieldFigures, posterior: &Posterior) -> Group {
-    let pairs = posterior.strongest_correlations(PAIRS);
-    let directions = posterior.weakest_directions(DIRECTIONS, PARTS).into_iter();
-    let directions = directions.map(|weak| {
-        let share = |(name, share): (String, f64)| Figure::List(vec![name.into(), share.into()]);
-        let shares: Vec<Figure> = weak.parts.into_iter().map(share).collect();
-        group! { "inflation" => weak.inflation, "shares" => Figure::List(shares) }
-    });
     let noise = fit.noise.white_mm.map(|mm| figure(mm * 1e3, "um"));
     group! {
         "hall_noise" => Figure::List(noise.into()),
         "reference_drift_after_1_s" => pose(fit.noise.drift_mm.map(|mm| mm * 1e-3)),
         "pose_uncertainty" => predictions(fit, posterior),
-        "strongest_correlations" => pairs.iter().map(correlation).collect::<Vec<_>>(),
-        "weakest_directions" => directions.collect::<Vec<_>>(),
     }
 }
 

@@ -18,5 +18,3 @@ pub mod table;
 pub mod text;
 pub mod trusted;
 pub mod verdict;
-
-pub use charts::Density;

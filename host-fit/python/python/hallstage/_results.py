@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -141,15 +140,11 @@ class Residuals:
         movement: NDArray[np.int64],
         axes: NDArray[np.float64],
         weight: NDArray[np.float64],
-        bin_hz: float,
-        power: Sequence[NDArray[np.float64]],
     ) -> None:
         self.time = time
         self.movement = movement
         self.x, self.y, self.rz = axes
         self.weight = weight
-        self._bin_hz = bin_hz
-        self._power = dict(zip(_AXES, power, strict=False))
 
     def __len__(self) -> int:
         return len(self.time)
@@ -167,11 +162,20 @@ class Residuals:
         """
         if axis not in _AXES:
             raise ValueError(f"axis: {axis!r} is none of x, y, rz")
-        if axis not in self._power:
+        steps = np.diff(self.time)
+        period = float(np.median(steps)) if len(steps) else 0.0
+        ends = (np.diff(self.movement) != 0) | (np.abs(steps - period) > 0.5 * period)
+        movements = np.split(np.nan_to_num(getattr(self, axis)), np.flatnonzero(ends) + 1)
+        longest = max(map(len, movements))
+        if longest < 32:
             raise ValueError("axis: no movement has the 32 rows that a spectrum needs")
-        power = self._power[axis][1:]
-        frequencies = self._bin_hz * np.arange(1, len(power) + 1, dtype=np.float64)
-        return (np.asarray(frequencies), np.sqrt(power))
+        length = min(4096, 1 << (longest.bit_length() - 1))
+        windows = np.concatenate([m[: len(m) // length * length].reshape(-1, length) for m in movements])
+        taper = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
+        bins = np.fft.rfft((windows - windows.mean(axis=1, keepdims=True)) * taper)[:, 1 : length // 2]
+        # One side of the spectrum; the sum of squares of the taper is 3/8 of its length.
+        power = np.mean(np.abs(bins) ** 2, axis=0) * 2 * period / (0.375 * length)
+        return (np.arange(1, length // 2) / (length * period), np.sqrt(power))
 
     def plot(self) -> Figure:
         """Errors over time, a panel for each axis, um and urad; needs matplotlib."""

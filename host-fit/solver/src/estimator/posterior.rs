@@ -3,10 +3,10 @@
 use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
 use super::temperature::Coefficient;
-use super::terms::{self, CARRY, COUNT, PER_PROBE, name};
+use super::terms::{self, CARRY, COUNT, PER_PROBE};
 use super::whiten::{LAG, Noise};
 use crate::estimator::model;
-use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
+use nalgebra::{DMatrix, Matrix3};
 use runtime::matrix::{from_rows, inverse, to_rows};
 
 /// Error of a probe's reading in service by the form of the model, rms, mm: mean over simulated stages,
@@ -26,16 +26,6 @@ pub struct Posterior {
     pub determined: Vec<usize>,
     parameters: FieldParameters,
     pub(super) white_mm: [f64; 3],
-}
-
-/// A combination of parameters.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Direction {
-    /// Variance along it over what it would be if the parameters were independent: how much
-    /// they stand in for each other.
-    pub inflation: f64,
-    /// The parameters with the largest shares: name, and share in terms of standard errors.
-    pub parts: Vec<(String, f64)>,
 }
 
 /// What is to be expected of a pose, as covariances of X, Y, Rz in m, m, rad.
@@ -165,10 +155,15 @@ impl Posterior {
 
     /// Pairs of parameters with a correlation above [`CORRELATION_SHOWN`] or below its negative, the strongest first.
     pub fn correlations_shown(&self) -> Vec<(String, String, f64)> {
-        let pairs = self.strongest_correlations(usize::MAX).into_iter();
+        let names = self.names();
+        let pairs = (0..names.len().min(COUNT)).flat_map(|i| (0..i).map(move |j| (j, i)));
+        let pairs =
+            pairs.map(|(i, j)| (names[i].clone(), names[j].clone(), self.correlation(i, j)));
+        let mut pairs: Vec<_> = pairs
+            .filter(|pair| pair.2.abs() > CORRELATION_SHOWN)
+            .collect();
+        pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
         pairs
-            .take_while(|pair| pair.2.abs() > CORRELATION_SHOWN)
-            .collect()
     }
 
     /// The posterior with k and h; `with_lag` is the covariance of all unknowns.
@@ -203,44 +198,6 @@ impl Posterior {
         }
     }
 
-    /// The `count` pairs of parameters that are most strongly correlated, the strongest first.
-    pub fn strongest_correlations(&self, count: usize) -> Vec<(String, String, f64)> {
-        let names = self.names();
-        let mut pairs: Vec<(usize, usize)> = (0..names.len().min(COUNT))
-            .flat_map(|i| (0..i).map(move |j| (j, i)))
-            .collect();
-        let strength = |&(i, j): &(usize, usize)| self.correlation(i, j).abs();
-        pairs.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-        let named =
-            |(i, j): (usize, usize)| (names[i].clone(), names[j].clone(), self.correlation(i, j));
-        pairs.into_iter().take(count).map(named).collect()
-    }
-
-    /// The `count` combinations of parameters that the log determines worst, the worst first,
-    /// with the `parts` parameters that have most to do with each.
-    pub fn weakest_directions(&self, count: usize, parts: usize) -> Vec<Direction> {
-        let correlations = DMatrix::from_fn(COUNT, COUNT, |i, j| self.correlation(i, j));
-        let eigen = SymmetricEigen::new(correlations);
-        let mut order: Vec<usize> = (0..COUNT).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-        let direction = |k: usize| {
-            let vector = eigen.eigenvectors.column(k);
-            let mut largest: Vec<usize> = (0..COUNT).collect();
-            largest.sort_by(|&a, &b| vector[b].abs().total_cmp(&vector[a].abs()));
-            // The largest share is positive, so that the same log gives the same signs.
-            let sign = vector[largest[0]].signum();
-            Direction {
-                inflation: eigen.eigenvalues[k],
-                parts: largest
-                    .into_iter()
-                    .take(parts)
-                    .map(|j| (name(j), sign * vector[j]))
-                    .collect(),
-            }
-        };
-        order.into_iter().take(count).map(direction).collect()
-    }
-
     /// What is to be expected of the pose `planar` (m, m, rad) at `vertical` (m, rad, rad);
     /// `None` where the probes don't determine it.
     pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
@@ -263,6 +220,7 @@ impl Posterior {
 mod tests {
     use super::*;
     use crate::estimator::sample_for_tests::parameters;
+    use crate::estimator::terms::name;
     use crate::estimator::whiten::UNKNOWNS;
     use runtime::VerticalPose;
 
