@@ -241,7 +241,9 @@ impl Calibration {
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [rms, peak] = [self.set.fit.rms, self.set.fit.peak].map(|of| of.map(f64::from));
         match &self.origin {
-            Origin::Fit(of) => finding::figures(py, &errors(&of.report.errors)),
+            Origin::Fit(of) if let Ok(fit) = &of.outcome.fitted => {
+                finding::figures(py, &errors(&fit.judgement.errors))
+            }
             _ => finding::figures(py, &from_rms_and_peak(rms, peak)),
         }
     }
@@ -375,10 +377,7 @@ impl Calibration {
         };
         let title = format!("calibration{of}, {model}");
         match self.origin.subject() {
-            Some(subject) => {
-                let findings = &subject.diagnosis.findings;
-                format!("{title}\n{}", text(&subject, findings))
-            }
+            Some(subject) => format!("{title}\n{}", text(&subject)),
             None => format!("<{title}>"),
         }
     }

@@ -79,13 +79,13 @@ impl Evaluation {
     /// rms and peak of X, Y, Rz over all rows: um, um, urad.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        finding::figures(py, &errors(&self.report.errors))
+        finding::figures(py, &errors(&self.evaluated.judgement.errors))
     }
 
     /// What is wrong with the logs, the most severe first.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        finding::list(py, &self.report.findings)
+        finding::list(py, &self.evaluated.diagnosis.findings)
     }
 
     /// What the user should know besides.
@@ -149,7 +149,7 @@ impl Evaluation {
     }
 
     fn __repr__(&self) -> String {
-        text(&self.evaluated.subject(), &self.report.findings)
+        text(&self.evaluated.subject())
     }
 
     fn _repr_html_(&self) -> PyResult<String> {

@@ -4,7 +4,6 @@ use crate::error::{internal, output_error, wrong};
 use crate::log::rows_of_three;
 use host_fit::calibration::words::message;
 use host_fit::input::dataset::Dataset;
-use host_fit::input::finding::Finding;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::write_atomically;
@@ -34,8 +33,9 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
 }
 
 /// The same in words, for a terminal.
-pub fn text(subject: &Subject, findings: &[Finding]) -> String {
-    let messages = findings.iter().map(|found| message(found) + "\n");
+pub fn text(subject: &Subject) -> String {
+    let findings = subject.diagnosis.findings.iter();
+    let messages = findings.map(|found| message(found) + "\n");
     Summary::new(subject).as_text() + &messages.collect::<String>()
 }
 

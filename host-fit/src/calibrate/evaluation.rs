@@ -1,7 +1,7 @@
 //! A blob judged on logs with reference.
 
 use crate::report::errors::RowErrors;
-use crate::report::result::{Circumstances, Judged, Report};
+use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
 use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
@@ -128,20 +128,20 @@ impl Evaluation {
         let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
         let mut warnings = words::messages(&self.log.warnings);
         warnings.extend(counts.map(|found| words::message(&found)));
-        let circumstances = Circumstances {
-            warnings,
-            ..Circumstances::new(&self.log, &self.stage, elapsed_s, self.diagnosis.clone())
-        };
-        let judged = Judged {
+        Report::from_judgement(Judged {
             set: &self.set,
             judgement: &self.judgement,
             zeros: self.zeros,
-            by_row: &self.by_row,
+            by_row: self.by_row.clone(),
             over_rows: self.of_rows.errors,
-        };
-        let mut report = Report::from_judgement(judged, &circumstances);
-        report.set_refusal(self.refusal.as_ref());
-        report
+            stage: &self.stage,
+            dataset: &self.log.dataset,
+            skipped_rows: self.log.skipped_rows,
+            elapsed_s,
+            warnings,
+            diagnosis: &self.diagnosis,
+            refusal: self.refusal.as_ref(),
+        })
     }
 
     /// How it ended, for reports.

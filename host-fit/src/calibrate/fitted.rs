@@ -3,7 +3,7 @@
 use super::Limits;
 use crate::report::errors::errors;
 use crate::report::figure::{Group, group};
-use crate::report::result::{Circumstances, Report};
+use crate::report::result::Report;
 use crate::report::trusted::trusted;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::fit_checks::over_noise;
@@ -230,14 +230,15 @@ impl Outcome {
         elapsed_s: f64,
     ) -> Option<Report> {
         let fit = self.fitted.as_ref().ok()?;
-        let diagnosis = self.diagnosis.clone();
-        let circumstances = Circumstances {
-            dataset: fit.rows(&log.dataset),
-            ..Circumstances::new(log, stage, elapsed_s, diagnosis)
-        };
-        let mut report = Report::from_fit(fit, &order.settings, &circumstances);
-        report.set_refusal(self.refusal.as_ref());
-        Some(report)
+        let judged = (&self.diagnosis, self.refusal.as_ref());
+        let of_log = (log, stage);
+        Some(Report::from_fit(
+            fit,
+            &order.settings,
+            of_log,
+            elapsed_s,
+            judged,
+        ))
     }
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::report::result::{Circumstances, Judged};
+use crate::report::result::Judged;
 use crate::report::verdict::End;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
@@ -71,22 +71,21 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         verdict: Some(Verdict::Limited),
         ..Diagnosis::default()
     };
-    let circumstances = Circumstances {
+    let judged = Judged {
+        set: &fit.set,
+        judgement: &fit.judgement,
+        zeros: Zeros::Refit,
+        by_row: fit.errors_by_row(&dataset),
+        over_rows: fit.judgement.errors,
         stage: &stage,
         dataset: &dataset,
         skipped_rows: 0,
         elapsed_s: 0.0,
         warnings: Vec::new(),
-        diagnosis: diagnosis.clone(),
+        diagnosis: &diagnosis,
+        refusal: None,
     };
-    let judged = Judged {
-        set: &fit.set,
-        judgement: &fit.judgement,
-        zeros: Zeros::Refit,
-        by_row: &fit.errors_by_row(&dataset),
-        over_rows: fit.judgement.errors,
-    };
-    let report = Report::from_judgement(judged, &circumstances);
+    let report = Report::from_judgement(judged);
     let subject = Subject {
         errors: Some(&fit.judgement.errors),
         ..subject(End::Written, &diagnosis)

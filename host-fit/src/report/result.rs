@@ -13,7 +13,6 @@ use hallstage_calibration::judge::{Judgement, Zeros};
 use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::axis::PROBES;
 use hallstage_input::dataset::{Dataset, Movement};
-use hallstage_input::finding::Finding;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -35,12 +34,8 @@ pub struct Report {
     pub parameters: BTreeMap<String, Parameter>,
     /// Setting, errors and zero deviation of each movement that was judged.
     pub movements: Vec<Group>,
-    /// Errors over the judged rows; zero deviations refitted unless `delta` says zero.
-    pub errors: PoseError,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// What a diagnosis of the log found, by severity.
-    pub findings: Vec<Finding>,
     /// Errors of the rows of the dataset, zero deviations taken off.
     pub by_row: RowErrors,
     /// Errors over these rows.
@@ -53,44 +48,8 @@ impl Serialize for Report {
     }
 }
 
-/// What a command knows besides the fit or judgement itself.
-#[derive(Clone, Debug)]
-pub struct Circumstances<'a> {
-    /// The stage.
-    pub stage: &'a Stage,
-    /// The rows.
-    pub dataset: &'a Dataset,
-    /// Rows skipped as bad.
-    pub skipped_rows: usize,
-    /// Time so far, s.
-    pub elapsed_s: f64,
-    /// Warnings from reading.
-    pub warnings: Vec<String>,
-    /// What a diagnosis of the log found.
-    pub diagnosis: Diagnosis,
-}
-
-impl<'a> Circumstances<'a> {
-    /// A log that was read and diagnosed, and the time since the start.
-    pub fn new(
-        log: &'a LogReading,
-        stage: &'a Stage,
-        elapsed_s: f64,
-        diagnosis: Diagnosis,
-    ) -> Self {
-        Self {
-            stage,
-            dataset: &log.dataset,
-            skipped_rows: log.skipped_rows,
-            elapsed_s,
-            warnings: words::messages(&log.warnings),
-            diagnosis,
-        }
-    }
-}
-
 /// A blob judged on logs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Judged<'a> {
     /// The blob.
     pub set: &'a ParameterSet,
@@ -99,9 +58,23 @@ pub struct Judged<'a> {
     /// How zero deviations were treated.
     pub zeros: Zeros<'static>,
     /// Errors of the rows of the dataset, zero deviations taken off.
-    pub by_row: &'a RowErrors,
+    pub by_row: RowErrors,
     /// Errors over these rows.
     pub over_rows: PoseError,
+    /// The stage.
+    pub stage: &'a Stage,
+    /// The rows.
+    pub dataset: &'a Dataset,
+    /// Rows skipped as bad.
+    pub skipped_rows: usize,
+    /// Time so far, s.
+    pub elapsed_s: f64,
+    /// Findings of the reading, and of the judgement itself.
+    pub warnings: Vec<String>,
+    /// What a diagnosis of the log found.
+    pub diagnosis: &'a Diagnosis,
+    /// Why the blob is not to be used.
+    pub refusal: Option<&'a Refusal>,
 }
 
 impl Report {
@@ -122,44 +95,47 @@ impl Report {
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
-    pub fn from_judgement(judged: Judged, c: &Circumstances) -> Self {
+    pub fn from_judgement(judged: Judged) -> Self {
         let Judged {
             set,
             judgement,
-            zeros,
-            by_row,
-            over_rows,
+            dataset,
+            diagnosis,
+            ..
         } = judged;
-        let (rows, movements) = c.dataset.read();
-        let (used, runs) = (c.dataset.rows.len(), c.dataset.movements.len());
+        let findings = &diagnosis.findings;
+        let refusal = judged.refusal.map(|why| WordedRefusal(why, findings));
+        let (rows, movements) = dataset.read();
+        let (used, runs) = (dataset.rows.len(), dataset.movements.len());
         let excerpt = (used < rows).then(|| group! { "rows" => used, "runs" => runs });
         let parameters = parameters_in(set);
-        let zero_deviations = zero_deviations(c.dataset, judgement);
-        let places_m = Parameters::from_set(set).nearest_places_m(c.stage);
+        let zero_deviations = zero_deviations(dataset, judgement);
+        let places_m = Parameters::from_set(set).nearest_places_m(judged.stage);
         let figures = group! {
             "model" => Model::from_kind(set.model).name,
             "rows" => rows,
             "judged_rows" => judgement.rows(),
             "train_rows" => set.fit.train_rows,
             "movements" => movements,
-            "skipped_rows" => c.skipped_rows,
-            "elapsed_s" => json!(c.elapsed_s),
+            "skipped_rows" => judged.skipped_rows,
+            "elapsed_s" => json!(judged.elapsed_s),
             "train_fitness" => bare(judgement.errors.fitness(), "um"),
             "errors" => errors(&judgement.errors),
-            "delta" => zeros.name(),
+            "delta" => judged.zeros.name(),
             "parameters" => json!(parameters),
             "coordinates" => json!(coordinates(places_m)),
             "serial" => set.serial.as_str(),
             "excerpt" => excerpt,
             "zero_deviations" => json!(zero_deviations),
-            "warnings" => json!(c.warnings),
-            "verdict" => json!(c.diagnosis.verdict),
-            "predicted" => json!(c.diagnosis.predicted),
-            "valid_within_k" => json!(c.diagnosis.validity.map(|validity| validity.within_k)),
-            "temperatures" => several(errors_per_degree(c.dataset, by_row)),
-            "findings" => json!(words::worded(&c.diagnosis.findings)),
-            "logs" => several(errors_per_log(c.dataset, judgement)),
+            "warnings" => json!(judged.warnings),
+            "verdict" => json!(diagnosis.verdict),
+            "predicted" => json!(diagnosis.predicted),
+            "valid_within_k" => json!(diagnosis.validity.map(|validity| validity.within_k)),
+            "temperatures" => several(errors_per_degree(dataset, &judged.by_row)),
+            "findings" => json!(words::worded(findings)),
+            "logs" => several(errors_per_log(dataset, judgement)),
             "trusted_inputs" => trusted(set),
+            "refusal" => json!(refusal),
             // Programs may look these up in any report.
             "model_reason" => Figure::None,
             "solver" => Figure::None,
@@ -173,18 +149,10 @@ impl Report {
             figures,
             parameters,
             movements: zero_deviations,
-            errors: judgement.errors,
-            warnings: c.warnings.clone(),
-            findings: c.diagnosis.findings.clone(),
-            by_row: by_row.clone(),
-            over_rows,
+            warnings: judged.warnings,
+            by_row: judged.by_row,
+            over_rows: judged.over_rows,
         }
-    }
-
-    /// Adds why the blob is not to be used: `refusal` with `code` and `message`, or null.
-    pub fn set_refusal(&mut self, refusal: Option<&Refusal>) {
-        let worded = refusal.map(|refusal| WordedRefusal(refusal, &self.findings));
-        self.figures.set("refusal", json!(worded));
     }
 
     /// The report of a fit. Only a fit has:
@@ -199,24 +167,36 @@ impl Report {
     /// | `errors_solver_delta` | errors with the solver's own zero deviations |
     /// | `field` | figures of a fit of the field model; null for other models |
     /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
-    pub fn from_fit(fit: &Fit, settings: &FitSettings, c: &Circumstances) -> Self {
+    pub fn from_fit(
+        fit: &Fit,
+        settings: &FitSettings,
+        (log, stage): (&LogReading, &Stage),
+        elapsed_s: f64,
+        (diagnosis, refusal): (&Diagnosis, Option<&Refusal>),
+    ) -> Self {
+        let dataset = fit.rows(&log.dataset);
         let (solver, projection) = match fit.field {
             Some(_) => (Solver::LeastSquares, Projection::Linear),
             None => (settings.solver, settings.options.projection),
         };
-        let by_row = fit.errors_by_row(c.dataset);
         let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
         let of_31 = estimate.parameters.model_31();
-        let mut report = Self::from_judgement(
-            Judged {
-                set: &fit.set,
-                judgement: &fit.judgement,
-                zeros: Zeros::for_model(fit.model),
-                by_row: &by_row,
-                over_rows: fit.judgement.errors,
-            },
-            c,
-        );
+        let mut warnings = words::messages(&log.warnings);
+        warnings.extend(words::messages(&fit.warnings(dataset, stage)));
+        let mut report = Self::from_judgement(Judged {
+            set: &fit.set,
+            judgement: &fit.judgement,
+            zeros: Zeros::for_model(fit.model),
+            by_row: fit.errors_by_row(dataset),
+            over_rows: fit.judgement.errors,
+            stage,
+            dataset,
+            skipped_rows: log.skipped_rows,
+            elapsed_s,
+            warnings,
+            diagnosis,
+            refusal,
+        });
         let (parameters, standard_errors) = match &fit.field {
             Some(_) => (
                 field_parameters(
@@ -231,10 +211,7 @@ impl Report {
             ),
         };
         report.parameters = parameters;
-        report
-            .warnings
-            .extend(words::messages(&fit.warnings(c.dataset, c.stage)));
-        let places_m = of_31.nearest_places_m(c.stage);
+        let places_m = of_31.nearest_places_m(stage);
         let lag = estimate.lag.map(|lag| {
             let value = figure(lag.value_s * 1e6, "us");
             group! {
@@ -245,10 +222,9 @@ impl Report {
         let correlations = posterior.correlations_shown();
         let correlations: Vec<Group> = correlations.iter().map(field::correlation).collect();
         let own = group! {
-            "train_fitness" => bare(fit.train_fitness(c.dataset, c.stage), "um"),
+            "train_fitness" => bare(fit.train_fitness(dataset, stage), "um"),
             "parameters" => json!(report.parameters),
             "coordinates" => json!(coordinates(places_m)),
-            "warnings" => json!(report.warnings),
             "model_reason" => fit.model_reason.as_str(),
             "solver" => solver.name(),
             "project" => projection.name(),
@@ -260,7 +236,7 @@ impl Report {
             "outlier_rows" => fit.fitted.outliers().count(),
             "standard_errors" => standard_errors,
             "correlations" => correlations,
-            "errors_solver_delta" => errors(&fit.errors_with_own_delta(c.dataset, c.stage)),
+            "errors_solver_delta" => errors(&fit.errors_with_own_delta(dataset, stage)),
             "field" => fit.field.as_ref().map(|of| field::figures(of, posterior)),
             "reference_lag" => lag,
         };
