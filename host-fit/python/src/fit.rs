@@ -1,19 +1,16 @@
 //! Fits and checks.
 
 use crate::calibration::Calibration;
-use crate::choice::chosen;
 use crate::error::{calibrate_error, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
-use host_fit::calibrate::{FitOrder, Limits, choose_loss};
+use host_fit::calibrate::{FitOptions, FitOrder, Limits};
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::{FitSettings, ModelChoice};
-use host_fit::solver::estimator::draw::Draw;
-use host_fit::solver::estimator::robust::Loss;
-use host_fit::solver::solve::{Projection, Solver, SolverOptions};
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use runtime::parameters::Text;
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,17 +18,6 @@ use std::time::Instant;
 /// A text that goes into a blob.
 pub fn blob_text(argument: &str, text: &str) -> PyResult<Text> {
     Text::try_from(text).map_err(|_| wrong(argument, "at most 32 bytes fit into a blob"))
-}
-
-/// A whole number within these ends.
-fn within(argument: &str, number: Option<i64>, low: i64, high: i64) -> PyResult<Option<usize>> {
-    match number {
-        Some(number) if !(low..=high).contains(&number) => Err(wrong(
-            argument,
-            format!("{number}; {low} to {high} will do"),
-        )),
-        number => Ok(number.map(|number| number as usize)),
-    }
 }
 
 /// Looks at a log as `host-fit check` does: fits it, keeps nothing, and gives what is wrong with it, the most
@@ -50,10 +36,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
         is_kept: false,
     };
     let (reading, stage) = (&log.reading, &log.designed);
-    let made = work::run(py, || {
-        let fitted = order.fit(reading, stage)?;
-        order.judge(fitted, reading, stage)
-    })?;
+    let made = work::run(py, || order.run(reading, stage))?;
     let outcome = made.map_err(|error| calibrate_error(&error))?;
     let verdict = finding::figures(py, &outcome.diagnosis.verdict)?;
     let findings = finding::list(py, &outcome.diagnosis.findings)?;
@@ -73,73 +56,40 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 /// Raises `LogRefused` with `.findings` where the log is no good for a calibration or the errors are beyond
 /// `limit`, unless `force` is true; `ValueError` that names the argument that is wrong.
 #[pyfunction]
-#[pyo3(signature = (
-    log, *, model = "auto", solver = "lm", project = "linear", loss = None, train = None,
-    draw = "stratified", population = None, generations = None, seed = 1, serial = "", created = "",
-    limit = None, force = false
-))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "each is named where it is called"
+#[pyo3(
+    signature = (log, **options),
+    text_signature = "(log, *, model='auto', solver='lm', project='linear', loss=None, train=None, draw='stratified', \
+                      population=None, generations=None, seed=1, serial='', created='', limit=None, force=False)"
 )]
 pub fn fit(
     py: Python<'_>,
     log: &Bound<'_, Log>,
-    model: &str,
-    solver: &str,
-    project: &str,
-    loss: Option<&str>,
-    train: Option<i64>,
-    draw: &str,
-    population: Option<i64>,
-    generations: Option<i64>,
-    seed: u64,
-    serial: &str,
-    created: &str,
-    limit: Option<&str>,
-    force: bool,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Calibration> {
     let started = Instant::now();
     let log = log.get();
     log.check_reference(py)?;
-    let model = chosen::<ModelChoice>("model", model)?;
-    let solver = chosen::<Solver>("solver", solver)?;
-    let project = chosen::<Projection>("project", project)?;
-    let loss = loss.map(|name| chosen::<Loss>("loss", name)).transpose()?;
-    let loss = choose_loss(loss, model, solver, project);
-    let loss = loss.map_err(|mismatch| wrong(mismatch.argument, mismatch.problem))?;
-    let usual = SolverOptions::new(project, seed);
-    let population = within("population", population, 4, 100_000)?;
-    let generations = within("generations", generations, 1, 10_000_000)?;
-    let limits: Option<Result<Limits, String>> = limit.map(str::parse);
-    let order = FitOrder {
-        settings: FitSettings {
-            model,
-            train: within("train", train, 1, i64::MAX)?,
-            draw: chosen::<Draw>("draw", draw)?,
-            solver,
-            loss,
-            options: SolverOptions {
-                population: population.unwrap_or(usual.population),
-                generations: generations.unwrap_or(usual.generations),
-                watch: WATCH,
-                ..usual
-            },
-            serial: blob_text("serial", serial)?,
-            created: blob_text("created", created)?,
-            force,
-        },
-        limits: limits
-            .transpose()
-            .map_err(|problem| wrong("limit", problem))?
-            .unwrap_or_default(),
-        is_kept: true,
-    };
+    let (mut words, mut created) = (Vec::new(), Text::default());
+    for (name, value) in options.into_iter().flatten() {
+        let name: String = name.extract()?;
+        match value.extract::<bool>() {
+            _ if name == "created" => {
+                let text: String = value.extract().map_err(|error| wrong("created", error))?;
+                created = blob_text("created", &text)?;
+            }
+            _ if value.is_none() => {}
+            Ok(false) => {}
+            Ok(true) => words.push(format!("--{name}")),
+            Err(_) => words.push(format!("--{name}={}", value.str()?.to_cow()?)),
+        }
+    }
+    let options = FitOptions::from_words(words).map_err(PyValueError::new_err)?;
+    let order = options.order(created, WATCH);
+    let order = order.map_err(|mismatch| wrong(mismatch.argument, mismatch.problem))?;
     let stage = &log.designed;
     let made = work::run(py, || {
         let log_and_stage = (&*log.reading, &**stage);
-        let fitted = order.fit(&log.reading, stage)?;
-        let outcome = order.judge(fitted, &log.reading, stage)?;
+        let outcome = order.run(&log.reading, stage)?;
         let report = outcome.report(&order, log_and_stage, started.elapsed().as_secs_f64());
         Ok((outcome, report))
     })?;

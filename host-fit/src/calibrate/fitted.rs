@@ -62,11 +62,15 @@ impl FitOrder {
         self.settings.options.watch.is_stopped()
     }
 
-    /// Fits a log.
+    /// Fits a log, diagnoses it with its fit, repairs a calibration that is kept, and says whether it may be used.
     ///
     /// # Errors
-    /// See [`CalibrateError`]; inside the result the errors of the fit.
-    pub fn fit(
+    /// See [`CalibrateError`].
+    pub fn run(&self, log: &LogReading, stage: &Stage) -> Result<Outcome, CalibrateError> {
+        self.judge(self.fit(log, stage)?, log, stage)
+    }
+
+    fn fit(
         &self,
         log: &LogReading,
         stage: &Stage,
@@ -85,11 +89,7 @@ impl FitOrder {
         }
     }
 
-    /// Diagnoses the log with its fit, repairs a calibration that is kept, and says whether it may be used.
-    ///
-    /// # Errors
-    /// See [`CalibrateError`].
-    pub fn judge(
+    fn judge(
         &self,
         mut fitted: Result<Fit, FitError>,
         log: &LogReading,

@@ -14,7 +14,7 @@ pub use evaluation::{EvalOrder, Evaluation};
 pub use fitted::{CalibrateError, FitOrder, Outcome};
 pub use limit::Limits;
 pub use recalibration::Updated;
-pub use settings::{Mismatch, choose_loss};
+pub use settings::{FitOptions, Mismatch};
 
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;

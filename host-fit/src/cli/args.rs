@@ -7,7 +7,6 @@ use crate::output::Outputs;
 use clap::Args;
 use hallstage_input::log::{self, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
-use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 
 /// The stage file of a command.
@@ -102,9 +101,4 @@ pub(super) struct Threads {
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) number: Option<u16>,
-}
-
-/// A text that goes into a blob.
-pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
-    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
 }

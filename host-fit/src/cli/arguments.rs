@@ -3,6 +3,7 @@
 use crate::calibrate::Choice;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use runtime::OnInvalid;
+use runtime::parameters::Text;
 use std::num::ParseIntError;
 use std::time::Duration;
 
@@ -46,4 +47,9 @@ pub(crate) fn train(text: &str) -> Result<Option<usize>, &'static str> {
         (_, Ok(rows)) if rows > 0 => Ok(Some(rows)),
         _ => Err("expected `all` or a number of rows, 1 or more"),
     }
+}
+
+/// A text that goes into a blob.
+pub(crate) fn blob_text(value: &str) -> Result<Text, &'static str> {
+    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
 }

@@ -49,9 +49,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         limits: Limits::default(),
         is_kept: false,
     };
-    let fitted = terminal::timed("fit", || order.fit(&log, &stage));
-    let fitted = fitted.map_err(HostError::from_calibrate)?;
-    let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
+    let outcome = terminal::timed("fit and diagnosis", || order.run(&log, &stage));
     let outcome = outcome.map_err(HostError::from_calibrate)?;
     let of_log = (&log, &stage);
     let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());

@@ -1,10 +1,10 @@
 //! `host-fit fit`.
 
-use super::args::{Json, Logs, Threads, blob_text};
-use super::arguments::{choice, train};
+use super::args::{Json, Logs, Threads};
+use super::arguments::choice;
 use super::interrupt;
 use super::report::finish;
-use crate::calibrate::{FitOrder, Limits, choose_loss};
+use crate::calibrate::FitOptions;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
@@ -13,14 +13,10 @@ use crate::report::parameters;
 use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
-use hallstage_calibration::fit::{Fit, FitSettings, ModelChoice};
+use hallstage_calibration::fit::Fit;
 use hallstage_calibration::words;
 use hallstage_input::log::{BadRows, LogReading, ReadOptions};
 use hallstage_input::stage::Stage;
-use hallstage_solver::estimator::draw::Draw;
-use hallstage_solver::estimator::robust::Loss;
-use hallstage_solver::solve::{Projection, Solver, SolverOptions};
-use runtime::parameters::Text;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -32,49 +28,13 @@ pub(super) struct FitArgs {
     /// Where to write the parameter blob.
     #[arg(long, value_name = "params.bin")]
     out: PathBuf,
-    /// Measurement model.
-    #[arg(long, value_name = "MODEL", value_parser = choice::<ModelChoice>(), default_value = "auto")]
-    model: ModelChoice,
-    /// Solver: `lm` is least squares, the others are the searches of the paper.
-    #[arg(long, value_name = "NAME", value_parser = choice::<Solver>(), default_value = Solver::LeastSquares.name())]
-    solver: Solver,
-    /// How much of the problem is solved in closed form.
-    #[arg(long, value_parser = choice::<Projection>(), default_value = "linear")]
-    project: Projection,
-    /// How much rows count that the model does not explain.
-    #[arg(long, value_name = "NAME", value_parser = choice::<Loss>())]
-    loss: Option<Loss>,
-    /// Rows to fit: `all` or a number.
-    #[arg(long, value_name = "N|all", default_value = "all", value_parser = train)]
-    train: std::option::Option<usize>,
-    /// How rows are drawn.
-    #[arg(long, value_parser = choice::<Draw>(), default_value = "stratified")]
-    draw: Draw,
-    /// Individuals of a search: 100 as in the paper, or 16 with --project linear.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
-    population: Option<u32>,
-    /// Generations of a search: 100 as in the paper; with --project linear at most 1000,
-    /// fewer once the fitness hardly falls any more.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    generations: Option<u32>,
-    /// Seed of everything random.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    options: FitOptions,
     #[command(flatten)]
     pub(super) threads: Threads,
-    /// Serial number of the stage, for the blob; at most 32 bytes.
-    #[arg(long, value_name = "TEXT", value_parser = blob_text)]
-    serial: Option<Text>,
     /// What to do with rows that cannot be used.
     #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
     bad_rows: BadRows,
-    /// Largest rms errors, of the field model in service, of others over all rows; beyond, no blob is
-    /// written.
-    #[arg(long, value_name = "x=1.5um,...")]
-    limit: Option<Limits>,
-    /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     report: super::report::Report,
     #[command(flatten)]
@@ -88,9 +48,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     super::check_outputs(outputs, Some(&args.report), args.logs.inputs())?;
-    let loss = choose_loss(args.loss, args.model, args.solver, args.project);
-    let loss = loss.map_err(HostError::from_mismatch)?;
-    interrupt::watch();
+    let created = args.report.created.clone().unwrap_or_default();
+    let order = args.options.order(created, interrupt::watch());
+    let order = order.map_err(HostError::from_mismatch)?;
     let stage = args.logs.stage.read()?;
     let log = args.logs.read(
         &stage,
@@ -99,14 +59,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             ..ReadOptions::FIT
         },
     )?;
-    let order = FitOrder {
-        settings: settings(args, loss),
-        limits: args.limit.unwrap_or_default(),
-        is_kept: true,
-    };
-    let fitted = terminal::timed("fit", || order.fit(&log, &stage));
-    let fitted = fitted.map_err(HostError::from_calibrate)?;
-    let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
+    let outcome = terminal::timed("fit and diagnosis", || order.run(&log, &stage));
     let outcome = outcome.map_err(HostError::from_calibrate)?;
     let of_log = (&log, &stage);
     let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
@@ -150,28 +103,6 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     }
 }
 
-/// How the fit is made, by the arguments.
-fn settings(args: &FitArgs, loss: Loss) -> FitSettings {
-    let usual = SolverOptions::new(args.project, args.seed);
-    let options = SolverOptions {
-        population: args.population.map_or(usual.population, |n| n as usize),
-        generations: args.generations.map_or(usual.generations, |n| n as usize),
-        watch: interrupt::watch(),
-        ..usual
-    };
-    FitSettings {
-        model: args.model,
-        train: args.train,
-        draw: args.draw,
-        solver: args.solver,
-        loss,
-        options,
-        serial: args.serial.clone().unwrap_or_default(),
-        created: args.report.created.clone().unwrap_or_default(),
-        force: args.force,
-    }
-}
-
 /// What the report says of a fit with its figures, or of a log that has none.
 fn source<'a>(
     args: &FitArgs,
@@ -179,7 +110,7 @@ fn source<'a>(
     subject: Subject<'a>,
     fit: Option<(&'a Fit, &'a Report)>,
 ) -> Result<Source<'a>, HostError> {
-    let serial = args.serial.as_deref().unwrap_or_default();
+    let serial = args.options.serial.as_deref().unwrap_or_default();
     let what = ("Calibration certificate", serial);
     let mut source = args.report.source(what, &args.logs, (log, stage), subject);
     if let (Some((fit, _)), End::Written | End::Interrupted) = (fit, subject.end) {

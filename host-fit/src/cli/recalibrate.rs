@@ -31,7 +31,7 @@ pub(super) struct RecalibrateArgs {
     #[arg(long, value_name = "new.bin")]
     out: PathBuf,
     /// Creation time, for the blob, as you want it to read; at most 32 bytes.
-    #[arg(long, value_name = "TIME", value_parser = super::args::blob_text)]
+    #[arg(long, value_name = "TIME", value_parser = super::arguments::blob_text)]
     created: Option<Text>,
     #[command(flatten)]
     json: Json,
