@@ -45,7 +45,7 @@ pub(crate) struct LiveArgs {
     /// End after this many seconds; without it, on Ctrl-C.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Duration>,
-    /// Seconds from line to line where output is no terminal.
+    /// Seconds from line to line.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     pub(crate) every: Duration,
     /// Give up a tick if frames are still missing after this time.

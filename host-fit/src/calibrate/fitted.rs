@@ -1,10 +1,8 @@
 //! A fit with the decisions around it.
 
 use super::Limits;
-use crate::report::errors::errors;
 use crate::report::figure::{Group, group};
 use crate::report::result::Report;
-use crate::report::trusted::trusted;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::fit_checks::over_noise;
 use hallstage_calibration::diagnose::refusal::Refusal;
@@ -199,26 +197,20 @@ impl Outcome {
         }
     }
 
-    /// The figures of a log that no calibration is kept of: model and errors of the fit, null without a fit; why there is no
-    /// fit, null if there is one.
-    pub fn checked(&self, log: &LogReading) -> Group {
+    /// The figures of a log without a fit, and why there is none.
+    pub fn without_fit(&self, log: &LogReading) -> Group {
         let (rows, movements) = log.dataset.read();
-        let (fit, diagnosis) = (self.fitted.as_ref().ok(), &self.diagnosis);
+        let diagnosis = &self.diagnosis;
         let refusal = self.refusal.as_ref();
         group! {
             "rows" => rows,
-            "judged_rows" => fit.map(|fit| fit.judgement.rows()),
             "movements" => movements,
             "skipped_rows" => log.skipped_rows,
-            "model" => fit.map(|fit| fit.model.name),
-            "errors" => fit.map(|fit| errors(&fit.judgement.errors)),
             "failure" => json!(self.fitted.as_ref().err().map(ToString::to_string)),
             "refusal" => json!(refusal.map(|refusal| WordedRefusal(refusal, &diagnosis.findings))),
             "warnings" => json!(words::messages(&log.warnings)),
             "verdict" => json!(diagnosis.verdict),
-            "predicted" => json!(diagnosis.predicted),
             "findings" => json!(words::worded(&diagnosis.findings)),
-            "trusted_inputs" => fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
         }
     }
 

@@ -1,10 +1,9 @@
-//! The display of `live`: a few lines that stay in place on a terminal, plain lines elsewhere.
+//! The lines that `live` shows.
 
 use hal_adapters::can::BusHealth;
 use runtime::tracker::Health;
 use runtime::{Reading, Status};
-use std::io::{IsTerminal, Write};
-use std::time::Duration;
+use std::io::Write;
 
 /// The displayed state.
 #[derive(Clone, Copy, Debug)]
@@ -21,63 +20,19 @@ pub(super) struct Shown<'s> {
     pub(super) is_down: bool,
 }
 
-/// Shows on standard output, or on standard error if standard output carries the record.
-#[derive(Debug)]
-pub(super) struct Display {
-    on_stderr: bool,
-    in_place: bool,
-    lines_up: usize,
+/// Shows a line on standard output, or on standard error if standard output carries the record. A closed output is no
+/// reason to stop decoding.
+pub(super) fn show(shown: &Shown<'_>, on_stderr: bool) {
+    let line = line(shown);
+    let _ = match on_stderr {
+        true => writeln!(std::io::stderr(), "{line}"),
+        false => writeln!(std::io::stdout(), "{line}"),
+    };
 }
 
-impl Display {
-    pub(super) fn new(on_stderr: bool) -> Self {
-        Self {
-            on_stderr,
-            in_place: match on_stderr {
-                true => std::io::stderr().is_terminal(),
-                false => std::io::stdout().is_terminal(),
-            },
-            lines_up: 0,
-        }
-    }
-
-    /// Time from one display to the next: ten times a second on a terminal.
-    pub(super) const fn interval(&self, every: Duration) -> Duration {
-        if self.in_place {
-            Duration::from_millis(100)
-        } else {
-            every
-        }
-    }
-
-    /// Shows the present state. A closed standard output is no reason to stop decoding.
-    pub(super) fn show(&mut self, shown: &Shown<'_>) {
-        let mut out: Box<dyn Write> = match self.on_stderr {
-            true => Box::new(std::io::stderr().lock()),
-            false => Box::new(std::io::stdout().lock()),
-        };
-        if self.in_place {
-            let lines = block(shown);
-            let up = match self.lines_up {
-                0 => String::new(),
-                lines => format!("\x1b[{lines}A"),
-            };
-            self.lines_up = lines.len();
-            let text: String = lines.iter().map(|l| format!("\x1b[2K{l}\n")).collect();
-            let _ = write!(out, "{up}{text}");
-        } else {
-            let words = |line: &String| line.split_whitespace().collect::<Vec<_>>().join(" ");
-            let line: Vec<String> = block(shown).iter().map(words).collect();
-            let _ = writeln!(out, "{}", line.join("; "));
-        }
-        let _ = out.flush();
-    }
-
-    /// Prints a message in a line of its own.
-    pub(super) fn say(&mut self, what: &str) {
-        self.lines_up = 0;
-        let _ = writeln!(std::io::stderr(), "{what}");
-    }
+/// Prints a message in a line of its own.
+pub(super) fn say(what: &str) {
+    let _ = writeln!(std::io::stderr(), "{what}");
 }
 
 fn state(shown: &Shown<'_>) -> String {
@@ -121,22 +76,20 @@ fn faults(bus: &BusHealth) -> String {
     )
 }
 
-fn block(shown: &Shown<'_>) -> Vec<String> {
+fn line(shown: &Shown<'_>) -> String {
     let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
-    vec![
-        format!("{:9.1} s   {}", shown.elapsed_s, state(shown)),
-        format!("X  {x:10.3} um    Y  {y:10.3} um    Rz {rz:10.3} urad"),
-        format!("Z  {z:10.3} um    Rx {rx:10.3} urad  Ry {ry:10.3} urad"),
-        format!("{:.1} ticks/s", shown.rate_hz),
-        format!(
-            "ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical",
-            shown.servo.ticks,
-            shown.servo.frames_missed,
-            shown.dropped,
-            shown.not_sent,
-            shown.servo.planar_invalid,
-            shown.servo.vertical_invalid
-        ),
-        format!("frames: {}", faults(&shown.bus)),
-    ]
+    format!(
+        "{:.1} s {}; X {x:.3} um Y {y:.3} um Rz {rz:.3} urad; Z {z:.3} um Rx {rx:.3} urad Ry {ry:.3} urad; {:.1} ticks/s; \
+         ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical; frames: {}",
+        shown.elapsed_s,
+        state(shown),
+        shown.rate_hz,
+        shown.servo.ticks,
+        shown.servo.frames_missed,
+        shown.dropped,
+        shown.not_sent,
+        shown.servo.planar_invalid,
+        shown.servo.vertical_invalid,
+        faults(&shown.bus)
+    )
 }

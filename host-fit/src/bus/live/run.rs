@@ -1,7 +1,7 @@
 //! The loop of `live`: the node on an interface, recorded and shown.
 
 use super::bus::now_us;
-use super::display::{Display, Shown};
+use super::display::{Shown, say, show};
 use super::node::{Node, NodeSettings};
 use super::{Bus, BusError, LiveArgs, LiveError};
 use crate::bus::BusAddress;
@@ -53,7 +53,7 @@ pub(crate) fn run(settings: &LiveArgs, stop: &AtomicBool) -> Result<(), LiveErro
         record,
         record_ended: None,
         sends: !settings.listen_only,
-        display: Display::new(settings.record.as_deref().is_some_and(is_standard_output)),
+        shows_on_stderr: settings.record.as_deref().is_some_and(is_standard_output),
         started: Instant::now(),
         shown_at: (0, Duration::ZERO),
         rate_hz: 0.0,
@@ -100,7 +100,7 @@ struct Session<'d> {
     record: Option<RecordFile>,
     record_ended: Option<LiveError>,
     sends: bool,
-    display: Display,
+    shows_on_stderr: bool,
     started: Instant,
     /// Decoded ticks and time at the last display.
     shown_at: (u32, Duration),
@@ -119,15 +119,14 @@ impl Session<'_> {
         end: Option<Duration>,
         every: Duration,
     ) -> Result<(), LiveError> {
-        let interval = self.display.interval(every);
-        let mut next_show = interval;
+        let mut next_show = every;
         while !stop.load(Ordering::Relaxed) {
             let elapsed = self.started.elapsed();
             if end.is_some_and(|end| elapsed >= end) {
                 break;
             }
             if elapsed >= next_show {
-                next_show = elapsed + interval;
+                next_show = elapsed + every;
                 let (ticks, since) = self.shown_at;
                 let now = self.node.tracker().health().ticks;
                 let s = (elapsed - since).as_secs_f64();
@@ -173,7 +172,7 @@ impl Session<'_> {
             Ok(Some(frame)) => {
                 if self.is_down {
                     self.is_down = false;
-                    self.display.say("the interface is up again");
+                    say("the interface is up again");
                 }
                 Ok(Some(frame))
             }
@@ -189,7 +188,7 @@ impl Session<'_> {
             self.last = Some(reading);
         }
         if let Some(command) = step.command {
-            self.display.say(&format!("request: {command:?}"));
+            say(&format!("request: {command:?}"));
         }
         self.note(step.fault);
     }
@@ -213,7 +212,7 @@ impl Session<'_> {
                 source,
                 after_s: self.started.elapsed().as_secs_f64(),
             };
-            self.display.say(&format!("{ended}; decoding goes on"));
+            say(&format!("{ended}; decoding goes on"));
             self.record = None;
             self.record_ended = Some(ended);
         }
@@ -221,7 +220,7 @@ impl Session<'_> {
 
     fn note(&mut self, fault: Option<BusFault>) {
         if let Some(fault @ (BusFault::Stale { .. } | BusFault::SenderRestarted)) = fault {
-            self.display.say(&fault.to_string());
+            say(&fault.to_string());
         }
     }
 
@@ -250,7 +249,7 @@ impl Session<'_> {
         if matches!(error, BusError::Down { .. }) {
             if !self.is_down {
                 self.is_down = true;
-                self.display.say(&format!("{error}; waiting for it"));
+                say(&format!("{error}; waiting for it"));
             }
             std::thread::sleep(Duration::from_millis(1));
             Ok(())
@@ -273,6 +272,6 @@ impl Session<'_> {
             is_stale: self.node.receiver().is_stale(),
             is_down: self.is_down,
         };
-        self.display.show(&shown);
+        show(&shown, self.shows_on_stderr);
     }
 }
