@@ -27,15 +27,6 @@ pub fn codes<'py>(
     Ok(array.cast_into::<PyArray2<i32>>()?.try_readonly()?)
 }
 
-/// Whole numbers, (n,), in `i64`.
-pub fn whole<'py>(
-    argument: &str,
-    given: &Bound<'py, PyAny>,
-) -> PyResult<PyReadonlyArray1<'py, i64>> {
-    let array = checked(argument, given, None, ("iu", "whole numbers"), "int64")?;
-    Ok(array.cast_into::<PyArray1<i64>>()?.try_readonly()?)
-}
-
 /// Numbers, (n,), in `f64`.
 pub fn reals<'py>(
     argument: &str,

@@ -3,7 +3,6 @@
 //! One file a group of classes; each function reads its arguments, calls the library without the GIL,
 //! and returns its result. The package computes nothing itself.
 
-mod array_text;
 mod arrays;
 mod calibration;
 mod choice;

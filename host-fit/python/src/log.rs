@@ -1,6 +1,5 @@
 //! Logs: from files, and from arrays.
 
-use crate::array_text::ArrayText;
 use crate::choice::chosen;
 use crate::error::{arrays_error, log_error, wrong};
 use crate::stage::Stage;
@@ -14,6 +13,7 @@ use host_fit::input::log::{
 use host_fit::input::stage::{Stage as Designed, TemperatureTable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use runtime::frame::MISSING_CODE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -105,69 +105,25 @@ impl Log {
     /// Raises `ValueError` with the name of an argument of wrong shape, dtype or unit, and `LogError` for a
     /// row, with `.line` the row from 0 and `.name` the argument.
     #[staticmethod]
-    #[pyo3(signature = (
-        stage, *, t_us, hall, caps = None, z = None, rx = None, ry = None, x = None, y1 = None, y2 = None, y = None,
-        rz = None, movement = None, mount = None, body = None, units = "m", angles = "rad", name = "arrays",
-        bad_rows = "refuse"
-    ))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "each is named where it is called"
+    #[pyo3(
+        signature = (stage, *, name = "arrays", bad_rows = "refuse", **arrays),
+        text_signature = "(stage, *, t_us, hall, caps=None, z=None, rx=None, ry=None, x=None, y1=None, y2=None, y=None, \
+                          rz=None, movement=None, mount=None, body=None, units='m', angles='rad', name='arrays', \
+                          bad_rows='refuse')"
     )]
     fn from_arrays(
         py: Python<'_>,
         stage: Py<Stage>,
-        t_us: &Bound<'_, PyAny>,
-        hall: &Bound<'_, PyAny>,
-        caps: Option<&Bound<'_, PyAny>>,
-        z: Option<&Bound<'_, PyAny>>,
-        rx: Option<&Bound<'_, PyAny>>,
-        ry: Option<&Bound<'_, PyAny>>,
-        x: Option<&Bound<'_, PyAny>>,
-        y1: Option<&Bound<'_, PyAny>>,
-        y2: Option<&Bound<'_, PyAny>>,
-        y: Option<&Bound<'_, PyAny>>,
-        rz: Option<&Bound<'_, PyAny>>,
-        movement: Option<&Bound<'_, PyAny>>,
-        mount: Option<&Bound<'_, PyAny>>,
-        body: Option<&Bound<'_, PyAny>>,
-        units: &str,
-        angles: &str,
         name: &str,
         bad_rows: &str,
+        arrays: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let options = options(bad_rows)?;
-        let mut text = ArrayText::new(units, angles)?;
-        text.real("t_us", "t_us", Some(t_us))?;
-        text.whole("movement", movement)?;
-        text.codes("hall", ["hall_a", "hall_b", "hall_c"], Some(hall))?;
-        text.codes("caps", ["cap_1", "cap_2", "cap_3"], caps)?;
-        // With a second beam x is a beam, else it is the pose.
-        let x_key = if y1.is_some() || y2.is_some() {
-            "ifm_x"
-        } else {
-            "x"
-        };
-        for (argument, key, given) in [("z", "z", z), ("x", x_key, x), ("y1", "ifm_y1", y1)] {
-            text.length(argument, key, given)?;
-        }
-        for (argument, key, given) in [("y2", "ifm_y2", y2), ("y", "y", y)] {
-            text.length(argument, key, given)?;
-        }
-        for (argument, given) in [("rx", rx), ("ry", ry), ("rz", rz)] {
-            text.angle(argument, given)?;
-        }
-        for (column, argument, given) in [(MOUNT, "mount", mount), (BODY, "body", body)] {
-            text.optional(column, argument, given)?;
-        }
-        Self::from_text(
-            py,
-            &text.bytes(),
-            Path::new(name),
-            stage,
-            &options,
-            &text.arguments,
-        )
+        let made = py.import("hallstage._arrays")?.getattr("log_text")?;
+        let (text, arguments): (String, Vec<(String, String)>) =
+            made.call((), arrays)?.extract()?;
+        let name = Path::new(name);
+        Self::from_text(py, text.as_bytes(), name, stage, &options, &arguments)
     }
 
     /// Rows that are held.

@@ -31,3 +31,49 @@ def checked(argument: str, given: Any, columns: int | None, kinds: str, wanted: 
         if least < ends.min or most > ends.max:
             raise ValueError(f"{argument}: numbers from {least} to {most}, but {ends.min} to {ends.max} is what fits")
     return np.ascontiguousarray(array, dtype)
+
+
+_REAL = ("iuf", "numbers", "float64")
+_WHOLE = ("iu", "whole numbers", "int64")
+_CODES = ("iu", "codes (whole numbers)", "int32")
+
+
+def log_text(
+    *, t_us: Any, hall: Any, caps: Any = None, z: Any = None, rx: Any = None, ry: Any = None, x: Any = None,
+    y1: Any = None, y2: Any = None, y: Any = None, rz: Any = None, movement: Any = None, mount: Any = None,
+    body: Any = None, units: str = "m", angles: str = "rad",
+) -> tuple[str, list[tuple[str, str]]]:  # fmt: skip
+    """Arrays as the text of a log, which passes all checks of a file; and the argument of each column."""
+    for argument, unit, known in (("units", units, "m mm um nm pm"), ("angles", angles, "rad mrad urad nrad deg")):
+        if not isinstance(unit, str) or unit not in known.split():
+            raise ValueError(f"{argument}: `{unit}` is none of {', '.join(known.split())}")
+    # With a second beam x is a beam, else it is the pose.
+    x_key = "x" if y1 is None and y2 is None else "ifm_x"
+    forms = [
+        ("t_us", t_us, _REAL, ["t_us"]),
+        ("movement", movement, _WHOLE, ["movement"]),
+        ("hall", hall, _CODES, ["hall_a", "hall_b", "hall_c"]),
+        ("caps", caps, _CODES, ["cap_1", "cap_2", "cap_3"]),
+        *((name, given, _REAL, [f"{name} [{angles}]"]) for name, given in (("rx", rx), ("ry", ry), ("rz", rz))),
+        *(
+            (name, given, _REAL, [f"{key} [{units}]"])
+            for name, key, given in (("z", "z", z), ("x", x_key, x), ("y1", "ifm_y1", y1), ("y2", "ifm_y2", y2), ("y", "y", y))
+        ),
+        ("mount", mount, _REAL, ["mount_c"]),
+        ("body", body, _REAL, ["body_c"]),
+    ]
+    names: list[tuple[str, str]] = []
+    columns: list[list[str]] = []
+    for argument, given, form, headers in forms:
+        if given is None and argument not in ("t_us", "hall"):
+            continue
+        array = checked(argument, given, 3 if form is _CODES else None, *form)
+        if columns and len(array) != len(columns[0]):
+            raise ValueError(f"{argument}: {len(array)} rows, but t_us has {len(columns[0])}")
+        names += [(header, argument) for header in headers]
+        for column in array.reshape(len(array), -1).T.tolist():
+            # A row may have no temperature.
+            empty = "" if argument in ("mount", "body") else "nan"
+            columns.append([empty if number != number else repr(number) for number in column])
+    header = ",".join(name for name, _ in names)
+    return "\n".join([header, *map(",".join, zip(*columns, strict=True)), ""]), names
