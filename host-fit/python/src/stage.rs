@@ -89,22 +89,10 @@ impl Stage {
         self.designed.hall.m_per_count
     }
 
-    /// Change of a gap for a capacitive code, m.
-    #[getter]
-    fn capacitive_m_per_count(&self) -> f64 {
-        self.designed.capacitive.m_per_count
-    }
-
     /// Where the Hall probes A, B, C stand as designed, (x, y) of each, m.
     #[getter]
     fn hall_places_m(&self) -> [[f64; 2]; 3] {
         self.designed.places_m()
-    }
-
-    /// Where the capacitive sensors 1, 2, 3 stand, (x, y) of each, m.
-    #[getter]
-    fn capacitive_places_m(&self) -> [[f64; 2]; 3] {
-        self.designed.capacitive_probes_m
     }
 
     /// Distance between the two Y beams of the interferometer, m.

@@ -17,6 +17,13 @@ pub trait Choice: Clone + Send + Sync + 'static {
     fn all() -> Vec<(Self, &'static str, &'static str)>;
 }
 
+/// The name of a value.
+pub fn name_of<T: Choice + PartialEq>(value: &T) -> &'static str {
+    let mut all = T::all().into_iter();
+    all.find(|(known, ..)| known == value)
+        .map_or("", |(_, name, _)| name)
+}
+
 /// Choices for the variants of an enum: name and help of each.
 macro_rules! values {
     ($($type:ty { $($variant:ident: $name:literal, $help:literal;)* })*) => {$(

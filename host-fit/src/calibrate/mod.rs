@@ -8,8 +8,8 @@ mod limit;
 mod recalibration;
 mod settings;
 
-pub use choice::Choice;
 pub(crate) use choice::values;
+pub use choice::{Choice, name_of};
 pub use evaluation::{EvalOrder, Evaluation};
 pub use fitted::{CalibrateError, FitOrder, Outcome};
 pub use limit::Limits;

@@ -1,5 +1,6 @@
 //! What is said of a calibration that was brought up to date.
 
+use super::name_of;
 use crate::report::errors::{errors, pose};
 use crate::report::figure::{Group, figure, group};
 use crate::report::verdict::{End, Subject};
@@ -90,7 +91,7 @@ fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[St
     // rms errors, from ratios to the noise floor.
     let rms = |ratios: [f64; 3]| pose([0, 1, 2].map(|k| new.floor[k] * ratios[k]));
     group! {
-        "what" => change.name(),
+        "what" => name_of(&change),
         "rows" => log.dataset.rows.len(),
         "movements" => log.dataset.movements.len(),
         "gains" => group! { "a" => a, "b" => b, "c" => c },

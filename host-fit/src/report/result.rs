@@ -5,6 +5,7 @@ use super::field;
 use super::figure::{Figure, Group, Item, bare, figure, group};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
 use super::trusted::trusted;
+use crate::calibrate::name_of;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{Fit, FitSettings};
@@ -232,7 +233,7 @@ impl Report {
             "evaluations" => estimate.evaluations,
             "solver_s" => json!(estimate.elapsed.as_secs_f64()),
             "stopped" => estimate.stopped.as_str(),
-            "loss" => fit.fitted.loss.name(),
+            "loss" => name_of(&fit.fitted.loss),
             "outlier_rows" => fit.fitted.outliers().count(),
             "standard_errors" => standard_errors,
             "correlations" => correlations,

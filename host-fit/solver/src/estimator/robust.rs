@@ -44,15 +44,6 @@ impl Loss {
     /// All of them, the default first.
     pub const ALL: [Self; 3] = [Self::Cauchy, Self::Huber, Self::None];
 
-    /// The name on the command line and in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Huber => "huber",
-            Self::Cauchy => "cauchy",
-        }
-    }
-
     /// The weights of rows with these residuals in three channels, whatever their unit, by movement:
     /// above 0, at most 1.
     pub fn weights(

@@ -49,16 +49,6 @@ const OF_PRIOR: f64 = 0.2;
 const LAG_S: f64 = 0.01;
 
 impl Change {
-    /// How the command line names it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gain => "gain",
-            Self::Gains => "gains",
-            Self::All => "all",
-            Self::Temperature => "temperature",
-        }
-    }
-
     /// The columns of L for it, each over the parameters.
     fn columns(self, old: &FieldParameters) -> Vec<[f64; COUNT]> {
         let gains = || {
