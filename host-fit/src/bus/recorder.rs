@@ -4,30 +4,33 @@
 mod run;
 mod watch;
 
-pub use run::run;
+pub(crate) use run::run;
 pub use watch::Monitor;
 
 use super::BusAddress;
 use super::live::BusError;
+use crate::cli::arguments::seconds;
+use crate::cli::key::KeyFile;
 use crate::output::OutputError;
+use clap::Args;
 use hal_adapters::can::command::Outcome;
-use hal_adapters::can::update::Key;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The settings of a record.
-#[derive(Clone, Debug)]
-pub struct RecorderSettings {
-    /// The interface, and the number of the node.
-    pub address: BusAddress,
-    /// Where to write the record: a new file.
-    pub out: PathBuf,
-    /// When to end; `None`: on Ctrl-C.
-    pub duration: Option<Duration>,
-    /// The stage's key, if the controller has one.
-    pub key: Option<Key>,
-    /// Show the counts on standard error, if that is a terminal.
-    pub shows: bool,
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+pub(crate) struct RecordArgs {
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
+    #[arg(value_name = "IFACE")]
+    pub(crate) can: BusAddress,
+    /// Where to write the record, as `candump -L` does, for `import`: a new file.
+    #[arg(long, value_name = "BUS.log")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) key: KeyFile,
+    /// End after this many seconds; without it, on Ctrl-C.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub(crate) seconds: Option<Duration>,
 }
 
 /// A record.

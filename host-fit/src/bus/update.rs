@@ -11,7 +11,7 @@ mod talk;
 
 pub use identity::Identity;
 pub use rezero::RezeroSettings;
-pub use run::{identify, read_back, rezero, update};
+pub use run::talk_to;
 pub use script::{UpdateSettings, Updated};
 pub use talk::{Link, SPACING_US, Talk};
 /// The scripts without an interface.

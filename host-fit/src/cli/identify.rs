@@ -3,7 +3,7 @@
 use super::args::Json;
 use super::interrupt;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, Identity};
+use crate::bus::update::{Identity, on, talk_to};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::report::figure::{Group, group};
@@ -25,7 +25,10 @@ pub(super) struct IdentifyArgs {
 /// Asks a controller for its identity and its parameters.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], None, [])?;
-    let figures = figures(&update::identify(&args.can, interrupt::watch())?);
+    let identity = talk_to(&args.can, interrupt::watch(), "asking", |talk, _| {
+        on::identify(talk)
+    })?;
+    let figures = figures(&identity);
     args.json.write(&figures)?;
     terminal::print(&as_text(&figures.tables()))
 }

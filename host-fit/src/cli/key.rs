@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// The key file of a command that asks a controller.
 #[derive(Debug, Args)]
-pub(super) struct KeyFile {
+pub(crate) struct KeyFile {
     /// The key of the stage, if the controller has one: a file with 32 hexadecimal digits.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,

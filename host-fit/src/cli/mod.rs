@@ -16,7 +16,7 @@ mod import;
 mod init;
 mod inspect;
 mod interrupt;
-mod key;
+pub(crate) mod key;
 mod live;
 mod plan;
 mod progress;
@@ -114,7 +114,7 @@ commands! {
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
     Live(crate::bus::live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
-    Record(record::RecordArgs) => record::run,
+    Record(crate::bus::recorder::RecordArgs) => record::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
     Identify(identify::IdentifyArgs) => identify::run,
     /// Store new parameters in a controller over a CAN bus (Linux).

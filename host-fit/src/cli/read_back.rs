@@ -3,7 +3,7 @@
 use super::identify;
 use super::interrupt;
 use crate::bus::BusAddress;
-use crate::bus::update;
+use crate::bus::update::{on, talk_to};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::write_atomically;
@@ -24,7 +24,12 @@ pub(super) struct ReadBackArgs {
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
     super::check_outputs([Some(args.out.as_path())], None, [])?;
-    let (identity, blob) = update::read_back(&args.can, interrupt::watch())?;
+    let (identity, blob) = talk_to(
+        &args.can,
+        interrupt::watch(),
+        "reading",
+        |talk, progress| on::read_back(talk, progress),
+    )?;
     write_atomically(&args.out, &blob)?;
     let parameters = identify::parameters(&identity);
     terminal::print(&format!("{}: runs {parameters}\n", identity.serial))?;

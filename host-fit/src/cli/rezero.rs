@@ -3,7 +3,7 @@
 use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, RezeroSettings};
+use crate::bus::update::{RezeroSettings, on, talk_to};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;
@@ -31,7 +31,10 @@ pub(super) fn run(args: &RezeroArgs) -> Result<(), HostError> {
         declares_servo_off: args.servo_off,
         clears: args.clear,
     };
-    update::rezero(&args.can, &zero, interrupt::watch())?;
+    let watch = interrupt::watch();
+    talk_to(&args.can, watch, "re-zeroing", |talk, _| {
+        on::rezero(talk, &zero)
+    })?;
     terminal::print(match args.clear {
         true => "the zero is cleared\n",
         false => "re-zeroed: the pose at rest is zero\n",

@@ -4,7 +4,7 @@ use super::identify;
 use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, UpdateSettings, Updated};
+use crate::bus::update::{UpdateSettings, Updated, on, talk_to};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
@@ -41,16 +41,18 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
         Some(path) => Some(read_blob(path, args.serial.as_deref())?),
         None => None,
     };
-    let updated = update::update(
+    let settings = UpdateSettings {
+        blob,
+        serial: args.serial.clone(),
+        key: args.key.read()?,
+        declares_servo_off: args.servo_off,
+        activates: args.activate,
+    };
+    let updated = talk_to(
         &args.can,
-        &UpdateSettings {
-            blob,
-            serial: args.serial.clone(),
-            key: args.key.read()?,
-            declares_servo_off: args.servo_off,
-            activates: args.activate,
-        },
         interrupt::watch(),
+        "updating",
+        |talk, progress| on::update(talk, &settings, progress),
     )?;
     terminal::print(&as_text(&updated))?;
     let (words, transfers) = (updated.repeated_words, updated.repeated_transfers);

@@ -100,14 +100,10 @@ impl<'t> Document<'t> {
             (DeValue::String(_), DeValue::Table(known)) if known.contains_key("column") => Ok(()),
             (DeValue::Integer(_), DeValue::Float(_)) => Ok(()),
             (value, like) if value.type_str() == like.type_str() && !value.is_array() => Ok(()),
-            (value, like) => {
-                let length = |value: &DeValue<'_>| value.as_array().map(|list| list.len());
-                let is_doubled = length(value) == length(like).map(|length| 2 * length);
-                let written = self.text.get(found.value.span()).unwrap_or_default();
-                let comma = decimal_comma(written).filter(|_| is_doubled);
+            (value, _) => {
                 let (kind, example) = (value.type_str(), self.example(&found.key));
                 let problem = format!("this {kind} does not fit; write it like {example}");
-                Err(self.refuse(found, comma.unwrap_or(problem)))
+                Err(self.refuse(found, problem))
             }
         }
     }

@@ -174,8 +174,8 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         ("eta_b = [0.65, 0.85]", "et_b = [0.65, 0.85]", 33, 1, "search.et_b", "did you mean `eta_b`?"),
         // A key that is missing beside others that look like it.
         ("h1x_m = 0.1975\n", "", 2, 1, "hall.h1x_m", "missing; add it"),
-        // Decimal commas.
-        ("[0.78, 0.98]", "[0,78, 0,98]", 32, 9, "search.eta_a", "write a decimal point (0.78, not 0,78)"),
+        // Decimal commas: four numbers in place of two.
+        ("[0.78, 0.98]", "[0,78, 0,98]", 32, 9, "search.eta_a", "write it like `eta_a = [0.78, 0.98]`"),
         ("# a note", "serial = 7", 1, 1, "serial", "capacitive, hall"),
         ("delta_m", "eta_d", 39, 1, "search.eta_d", "eta_c, h1x_m"),
         // Another kind of value.

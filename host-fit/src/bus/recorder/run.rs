@@ -1,11 +1,12 @@
 //! Asks the controller for codes, records the bus, and asks the controller to stop.
 
-use super::{MISSING_ONE_IN, Monitor, Recorded, RecorderError, RecorderSettings};
+use super::{MISSING_ONE_IN, Monitor, RecordArgs, Recorded, RecorderError};
 use crate::bus::live::{Bus, BusError, now_us};
 use crate::bus::update::{Link, Talk, UpdateError};
 use crate::output::record_file::RecordFile;
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::table::TABLE;
+use hal_adapters::can::update::Key;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use hal_adapters::candump::LogLine;
 use std::io::{IsTerminal, Write};
@@ -25,16 +26,19 @@ const SHOWN_EVERY: Duration = Duration::from_millis(200);
 ///
 /// # Errors
 /// See [`RecorderError`]. Without codes there is no file.
-pub fn run(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, RecorderError> {
+pub(crate) fn run(
+    args: &RecordArgs,
+    key: Option<Key>,
+    shows: bool,
+    stop: &AtomicBool,
+) -> Result<Recorded, RecorderError> {
     let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
     let mut session = Session {
-        settings,
-        bus: Bus::open(
-            &settings.address.interface,
-            settings.address.node,
-            &messages,
-        )?,
-        file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
+        args,
+        key,
+        shows,
+        bus: Bus::open(&args.can.interface, args.can.node, &messages)?,
+        file: RecordFile::create(&args.out).map_err(RecorderError::NoRecord)?,
         watch: Monitor::default(),
         failure: None,
         // A node ignores a request that equals the last one: another token for each program.
@@ -68,7 +72,9 @@ pub fn run(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, R
 }
 
 struct Session<'s> {
-    settings: &'s RecorderSettings,
+    args: &'s RecordArgs,
+    key: Option<Key>,
+    shows: bool,
     bus: Bus,
     file: RecordFile,
     watch: Monitor,
@@ -84,7 +90,7 @@ impl Session<'_> {
     fn ask(&mut self, on: bool) -> Result<(), RecorderError> {
         // Each dialog uses five tokens at most for each tag.
         self.token = self.token.wrapping_add(40);
-        let (key, token) = (self.settings.key, self.token);
+        let (key, token) = (self.key, self.token);
         let mut talk = Talk::new(&mut *self, token);
         let answered = talk.exchange_tagged(key.as_ref(), Request::Record { on });
         match answered {
@@ -97,7 +103,7 @@ impl Session<'_> {
                 outcome: Some(Outcome::NoRandomNumber),
             }),
             Err(_) => Err(self.failure.take().unwrap_or(RecorderError::NoAnswer {
-                address: self.settings.address.clone(),
+                address: self.args.can.clone(),
             })),
         }
     }
@@ -106,7 +112,7 @@ impl Session<'_> {
         let started = Instant::now();
         let mut asked = started;
         while !stop.load(Ordering::Relaxed) {
-            let left = match self.settings.duration {
+            let left = match self.args.seconds {
                 None => WAIT_MAX,
                 Some(duration) => match duration.checked_sub(started.elapsed()) {
                     None => break,
@@ -160,8 +166,8 @@ impl Session<'_> {
     fn write(&mut self, stamped: &StampedFrame) -> Result<(), RecorderError> {
         self.file.line(LogLine {
             time_us: stamped.time_us,
-            interface: &self.settings.address.interface,
-            frame: self.settings.address.node.to_bus(&stamped.frame),
+            interface: &self.args.can.interface,
+            frame: self.args.can.node.to_bus(&stamped.frame),
         })?;
         Ok(())
     }
@@ -180,7 +186,7 @@ impl Session<'_> {
     fn show(&mut self) {
         let mut out = std::io::stderr().lock();
         let due = self.shown.is_none_or(|last| last.elapsed() >= SHOWN_EVERY);
-        if self.settings.shows && due && out.is_terminal() {
+        if self.shows && due && out.is_terminal() {
             self.shown = Some(Instant::now());
             let seconds = self.started.elapsed().as_secs_f64();
             let _ = write!(out, "\r\x1b[2K{seconds:.1} s: {}", self.watch);
@@ -211,7 +217,7 @@ impl Session<'_> {
                     0 => self.watch.state(),
                     frames => format!("this computer was too busy and dropped {frames} frames"),
                 },
-                path: self.settings.out.clone(),
+                path: self.args.out.clone(),
             });
         }
         Ok(self.watch)

@@ -1,9 +1,6 @@
-//! The scripts on a CAN interface.
+//! A script on a CAN interface.
 
-use super::{
-    Identity, Link, RezeroSettings, Talk, UpdateError, UpdateRunError, UpdateSettings, Updated,
-    identity, script,
-};
+use super::{Link, Talk, UpdateError, UpdateRunError};
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use hal_adapters::can::{BusFrame, Message};
@@ -14,55 +11,6 @@ use std::time::{Duration, Instant, SystemTime};
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
 
-/// Asks for the identity of the node.
-///
-/// # Errors
-/// See [`UpdateRunError`].
-pub fn identify(address: &BusAddress, watch: Watch<'_>) -> Result<Identity, UpdateRunError> {
-    hold(address, watch, "asking", |talk, _| identity::identify(talk))
-}
-
-/// Reads the blob that the node runs.
-///
-/// # Errors
-/// See [`UpdateRunError`].
-pub fn read_back(
-    address: &BusAddress,
-    watch: Watch<'_>,
-) -> Result<(Identity, Vec<u8>), UpdateRunError> {
-    hold(address, watch, "reading", |talk, progress| {
-        identity::read_back(talk, progress)
-    })
-}
-
-/// Updates the node. Ctrl-C ends it until the node stores the blob.
-///
-/// # Errors
-/// See [`UpdateRunError`].
-pub fn update(
-    address: &BusAddress,
-    plan: &UpdateSettings,
-    watch: Watch<'_>,
-) -> Result<Updated, UpdateRunError> {
-    hold(address, watch, "updating", |talk, progress| {
-        script::update(talk, plan, progress)
-    })
-}
-
-/// Sets or clears the zero of a stage at rest.
-///
-/// # Errors
-/// See [`UpdateRunError`].
-pub fn rezero(
-    address: &BusAddress,
-    zero: &RezeroSettings,
-    watch: Watch<'_>,
-) -> Result<(), UpdateRunError> {
-    hold(address, watch, "re-zeroing", |talk, _| {
-        super::on::rezero(talk, zero)
-    })
-}
-
 /// A token from the clock: the last run of this program hardly had the same.
 fn now_token() -> u8 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
@@ -70,7 +18,7 @@ fn now_token() -> u8 {
 }
 
 /// A CAN interface as a link.
-struct Interface<'s> {
+pub struct Interface<'s> {
     bus: Bus,
     started: Instant,
     stop: &'s AtomicBool,
@@ -104,12 +52,16 @@ impl Link for Interface<'_> {
     }
 }
 
-/// Runs a script on an interface with a progress bar.
-fn hold<T>(
+/// Runs a script of [`on`](super::on) on an interface; `what` is shown with its progress. Ctrl-C ends an update until the
+/// node stores the blob.
+///
+/// # Errors
+/// See [`UpdateRunError`].
+pub fn talk_to<T>(
     address: &BusAddress,
     watch: Watch<'_>,
     what: &'static str,
-    talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
+    script: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
         bus: Bus::open(&address.interface, address.node, &[Message::Answer])?,
@@ -117,7 +69,7 @@ fn hold<T>(
         stop: watch.stop,
     };
     let (mut talk, mut bar) = (Talk::new(link, now_token()), None);
-    let result = talks(&mut talk, &mut |done, total| {
+    let result = script(&mut talk, &mut |done, total| {
         bar.get_or_insert_with(|| watch.begin(what, total))
             .reach(done);
     });
