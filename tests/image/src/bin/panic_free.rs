@@ -15,7 +15,8 @@ use hal_adapters::can::{
 use runtime::blob::MAX_BYTES;
 use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{
-    OnInvalid, ParameterSet, PlanarPose, PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
+    OnInvalid, ParameterSet, PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading,
+    VerticalPose,
 };
 
 extern crate image;
@@ -127,6 +128,9 @@ fn main() -> ! {
         let mut predictor = black_box(Predictor::new(4_000));
         predictor.take(&tracker, &frame, &reading);
         black_box(predictor.pose_at(black_box(2_300)));
+        let correction = black_box(set.motion_correction.unwrap_or_default());
+        let commanded = black_box(PlanarMotion::default());
+        black_box(correction.correct(reading.pose.planar, &commanded));
         black_box(tracker.tick_without_frame());
         black_box(tracker.tick_with(1, |zero| {
             decoder.decode_at(
