@@ -45,6 +45,7 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::field::FieldFigures;
 use hallstage_solver::estimator::model::Model;
 use runtime::calibration::Origin;
@@ -102,6 +103,7 @@ impl Fit {
         let made = calibration(sound, stage, model.kind, &estimate.parameters);
         let calibration = Calibration {
             temperature: estimate.temperature,
+            motion_correction: estimate.motion_correction(),
             ..made.map_err(FitError::Unusable)?
         };
         let origin = Origin {
@@ -127,6 +129,15 @@ impl Fit {
             decoded,
             judgement,
         })
+    }
+
+    /// With what a diagnosis takes for the motion of the probes.
+    #[must_use]
+    pub fn with_motion(mut self, motion: &MotionFit) -> Self {
+        self.estimate.motion = *motion;
+        self.calibration.motion_correction = self.estimate.motion_correction();
+        self.set.motion_correction = self.calibration.motion_correction;
+        self
     }
 
     /// The rows of the fit, of a log with the rows `read`.

@@ -1,6 +1,6 @@
 //! A blob judged on logs with reference.
 
-use crate::report::errors::RowErrors;
+use crate::report::errors::{RowErrors, errors};
 use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
@@ -49,6 +49,8 @@ pub struct Evaluation {
     pub by_row: RowErrors,
     /// Over these.
     of_rows: Judgement,
+    /// Over these, with poses corrected by speed and acceleration; `None` for a blob without a correction.
+    corrected: Option<PoseError>,
     zeros: Zeros<'static>,
     limit: f64,
     /// Why the blob does not do for these logs; `None` if it does.
@@ -87,6 +89,10 @@ impl Evaluation {
         let judgement = judge.clone().judgement(zeros);
         let decoded = Decoded::new(set, &log.dataset);
         let of_rows = decoded.judge(&log.dataset, stage, zeros);
+        let corrected = set.motion_correction.as_ref().map(|correction| {
+            let corrected = decoded.corrected(correction, &log.dataset);
+            corrected.judge(&log.dataset, stage, zeros).errors
+        });
         let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
         let is_refitted = zeros == Zeros::Refit;
         let blob_use = BlobUse::Evaluated { is_refitted };
@@ -118,6 +124,7 @@ impl Evaluation {
             diagnosis,
             by_row,
             of_rows,
+            corrected,
             zeros,
             limit,
         })
@@ -128,7 +135,7 @@ impl Evaluation {
         let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
         let mut warnings = words::messages(&self.log.warnings);
         warnings.extend(counts.map(|found| words::message(&found)));
-        Report::from_judgement(Judged {
+        let mut report = Report::from_judgement(Judged {
             set: &self.set,
             judgement: &self.judgement,
             zeros: self.zeros,
@@ -141,7 +148,10 @@ impl Evaluation {
             warnings,
             diagnosis: &self.diagnosis,
             refusal: self.refusal.as_ref(),
-        })
+        });
+        let corrected = self.corrected.as_ref().map(errors);
+        report.figures.set("errors_corrected", corrected);
+        report
     }
 
     /// How it ended, for reports.

@@ -103,6 +103,9 @@ impl FitOrder {
                 failed => failed,
             };
         }
+        if let Some(motion) = &diagnosis.motion {
+            fitted = fitted.map(|fit| fit.with_motion(&motion.fit));
+        }
         let mut outcome = Outcome {
             fitted,
             diagnosis,

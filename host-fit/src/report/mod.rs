@@ -8,6 +8,7 @@ pub mod field;
 pub mod figure;
 pub mod html;
 mod json;
+mod motion;
 pub mod page;
 pub mod parameters;
 pub mod plan;

@@ -3,6 +3,7 @@
 use super::errors::{RowErrors, errors, errors_per_degree, errors_per_log};
 use super::field;
 use super::figure::{Figure, Group, Item, bare, figure, group};
+use super::motion::{probe_motion, valid_up_to};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
 use super::trusted::trusted;
 use crate::calibrate::name_of;
@@ -94,6 +95,7 @@ impl Report {
     /// | `excerpt` | rows of a long log that fit, diagnosis and figures use, and their runs of successive rows; null for all rows |
     /// | `zero_deviations` | of each movement that was judged |
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
+    /// | `valid_up_to` | the rms acceleration and speed of all axes at once up to which they are good |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
     pub fn from_judgement(judged: Judged) -> Self {
@@ -132,6 +134,7 @@ impl Report {
             "verdict" => json!(diagnosis.verdict),
             "predicted" => json!(diagnosis.predicted),
             "valid_within_k" => json!(diagnosis.validity.map(|validity| validity.within_k)),
+            "valid_up_to" => json!(diagnosis.motion.map(valid_up_to)),
             "temperatures" => several(errors_per_degree(dataset, &judged.by_row)),
             "findings" => json!(words::worded(findings)),
             "logs" => several(errors_per_log(dataset, judgement)),
@@ -167,6 +170,7 @@ impl Report {
     /// | `correlations` | pairs of parameters with a correlation above 0.95 or below -0.95 |
     /// | `errors_solver_delta` | errors with the solver's own zero deviations |
     /// | `field` | figures of a fit of the field model; null for other models |
+    /// | `probe_motion` | lags of A, B, C behind their mean; what the acceleration of X, Y, Rz, Z, Rx, Ry (rotations at 0.25 m) adds to the readings of A, then B, then C; the matrices of the correction, SI |
     /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
     pub fn from_fit(
         fit: &Fit,
@@ -240,6 +244,7 @@ impl Report {
             "errors_solver_delta" => errors(&fit.errors_with_own_delta(dataset, stage)),
             "field" => fit.field.as_ref().map(|of| field::figures(of, posterior)),
             "reference_lag" => lag,
+            "probe_motion" => probe_motion(fit),
         };
         own.0
             .into_iter()

@@ -48,6 +48,7 @@ pub mod temperature;
 
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
+use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused, severity};
 use faults::{Calibrated, Faults, find_faults};
@@ -76,6 +77,8 @@ pub struct Diagnosis {
     pub repair: Option<Repair>,
     /// How far from the temperature of the log a calibration by the field model is good.
     pub validity: Option<Validity>,
+    /// What speed and acceleration add in service; [`Self::predicted`] includes it.
+    pub motion: Option<InMotion>,
 }
 
 /// The diagnosis of a log and of the fit to it.
@@ -105,6 +108,7 @@ pub fn diagnose_log(
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_fitted: fitted.is_ok(),
+        shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.is_determined),
     };
     let mut out = Diagnosis::default();
     // A log that determines no parameters shows nothing of its channels.
@@ -131,7 +135,21 @@ pub fn diagnose_log(
         Ok(_) => Basis::Fit { is_for_service },
         Err(_) => Basis::NoFit,
     };
-    out.conclude(basis);
+    out.motion = fitted.ok().and_then(|fit| {
+        let (motion, parameters) = (&fit.estimate.motion, &fit.estimate.parameters);
+        let motion = match out.shows_probe_lags() {
+            true => *motion,
+            false => motion.without_probe_lags(),
+        };
+        InMotion::new(&motion, parameters, stage, out.predicted.as_ref()?)
+    });
+    if let (Some(motion), Some(at_rest)) = (out.motion, out.predicted) {
+        out.findings.extend(motion.finding(&at_rest));
+        out.conclude(basis);
+        out.predicted = Some(at_rest.with_added(motion.added));
+    } else {
+        out.conclude(basis);
+    }
     out.validity = field.and_then(|field| {
         let estimate = fitted.ok().map(|fit| &fit.estimate)?;
         let (mut parameters, mut covariance) =
@@ -253,6 +271,21 @@ impl Diagnosis {
         self.findings.extend(of.findings);
     }
 
+    /// Whether the lags of the probes in the fit are lags of the probes: no beam is late, and no other fault bent the
+    /// fit.
+    fn shows_probe_lags(&self) -> bool {
+        let late = |found: &&Finding| found.code() == Code::ReferenceLag;
+        let mut late = self
+            .findings
+            .iter()
+            .filter(late)
+            .flat_map(Finding::channels);
+        match late.next() {
+            Some(channel) => !channel.is_beam(),
+            None => self.repair.is_none(),
+        }
+    }
+
     /// Adds the findings about the fit that no fault explains.
     fn add_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
         let findings = &mut self.findings;
@@ -329,6 +362,7 @@ pub fn diagnose_blob(
         },
         is_for_service,
         is_fitted: false,
+        shows_acceleration: false,
     };
     let mut out = Diagnosis::default();
     out.add_faults(dataset, dataset, stage, (by, 0.0), true);

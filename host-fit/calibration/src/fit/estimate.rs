@@ -1,9 +1,11 @@
 //! What a fit, a search or a repair finds: parameters, and how well the log determines them.
 
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
-use runtime::Temperature;
+use runtime::matrix::to_rows;
+use runtime::{MotionCorrection, Temperature};
 use std::time::Duration;
 
 /// Parameters with their posterior. All other figures of a [`Fit`](super::Fit) follow from these.
@@ -17,6 +19,8 @@ pub struct Estimate {
     pub posterior: Posterior,
     /// By how much the reference lags behind the probes; `None` where nothing in the log shows it.
     pub lag: Option<ReferenceLag>,
+    /// Lags of the probes, and what acceleration adds to their readings.
+    pub motion: MotionFit,
     /// The solver's own zero deviation of each movement, m, by the rows that were fitted; `None` where it
     /// has none of its own.
     pub delta_m: Option<Vec<[f64; 3]>>,
@@ -26,4 +30,17 @@ pub struct Estimate {
     pub elapsed: Duration,
     /// Why the solver stopped, for the report.
     pub stopped: String,
+}
+
+impl Estimate {
+    /// The correction by commanded speed and acceleration; `None` unless the log determines what acceleration adds.
+    pub fn motion_correction(&self) -> Option<MotionCorrection> {
+        let found = self.motion.correction(&self.parameters);
+        let [acceleration, velocity] = found.filter(|_| self.motion.is_determined)?;
+        let rows = |m| to_rows(m).map(|row| row.map(|x| x as f32));
+        Some(MotionCorrection {
+            acceleration_s2: rows(&acceleration),
+            velocity_s: rows(&velocity),
+        })
+    }
 }

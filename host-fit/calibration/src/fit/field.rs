@@ -73,6 +73,7 @@ impl Job<'_> {
         )?;
         let estimate = Estimate {
             lag: found.lag,
+            motion: found.motion,
             parameters: found.parameters,
             temperature: found.figures.temperature.temperature,
             posterior: found.posterior,

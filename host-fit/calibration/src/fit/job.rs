@@ -7,6 +7,7 @@ use crate::judge::identify::{check_described, check_determined, check_motion};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::draw::draw_rows;
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::{Parameters, SLOPES, search_box};
@@ -161,17 +162,18 @@ impl<'a> Job<'a> {
         let sandwich = Sandwich::new(&problem, &parameters).ok_or(at_pole)?;
         let (_, vertical) = reach(fitted.sound(dataset));
         let determined = check_determined(stage, model, &parameters, &sandwich, vertical);
-        // A lag shows at the best description of the log, which a search may be far from.
-        let lag = match solver {
+        // Lags show at the best description of the log, which a search may be far from.
+        let (lag, motion) = match solver {
             Solver::Search(_) => {
                 let best = Solver::LeastSquares.solve(&problem, &settings.options).ok();
                 let at_best = best.and_then(|best| Sandwich::new(&problem, &best.parameters));
-                at_best.and_then(|at_best| at_best.lag)
+                at_best.map_or((None, MotionFit::unknown()), |best| (best.lag, best.motion))
             }
-            Solver::LeastSquares => sandwich.lag,
+            Solver::LeastSquares => (sandwich.lag, sandwich.motion),
         };
         let estimate = Estimate {
             lag,
+            motion,
             parameters: FieldParameters::from_model_31(&parameters, stage),
             temperature: dataset.temperature,
             posterior: sandwich.posterior,

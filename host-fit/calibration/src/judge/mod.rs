@@ -18,6 +18,7 @@
 //! ```
 
 pub mod identify;
+pub mod in_motion;
 mod judgement;
 pub mod left_out;
 pub mod precision;
@@ -32,9 +33,10 @@ use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::rows::planar_motion;
 use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
-use runtime::{AnyDecoder, ParameterSet, PlanarPose};
+use runtime::{AnyDecoder, MotionCorrection, ParameterSet, PlanarPose};
 use statistics::ErrorSums;
 
 /// Which zero deviations are taken off before errors are counted.
@@ -86,6 +88,22 @@ impl Decoded {
             parameters: Parameters::from_set(set),
             errors: dataset.rows.par_iter().map(one).collect(),
         }
+    }
+
+    /// With poses corrected by the speed and the acceleration of the reference.
+    #[must_use]
+    pub fn corrected(&self, correction: &MotionCorrection, dataset: &Dataset) -> Self {
+        let mut corrected = self.clone();
+        let motion = planar_motion(dataset).into_iter();
+        for (error, [speed, acceleration]) in corrected.errors.iter_mut().zip(motion) {
+            for (axis, error) in error.iter_mut().flatten().enumerate() {
+                for k in 0..3 {
+                    *error += f64::from(correction.velocity_s[axis][k]) * speed[k];
+                    *error += f64::from(correction.acceleration_s2[axis][k]) * acceleration[k];
+                }
+            }
+        }
+        corrected
     }
 
     /// The figures with these zero deviations taken off.

@@ -63,6 +63,23 @@ impl Predicted {
         }
     }
 
+    /// The noise floor of an axis, m or rad.
+    pub fn noise(&self, axis: usize) -> f64 {
+        self.rms[axis] / self.ratio[axis]
+    }
+
+    /// With other errors that add these variances: m2, m2, rad2.
+    #[must_use]
+    pub fn with_added(&self, variances: [f64; 3]) -> Self {
+        let more = |rms: f64, axis: usize| (rms * rms + variances[axis]).sqrt();
+        let rms = [0, 1, 2].map(|axis| more(self.rms[axis], axis));
+        Self {
+            rms,
+            ratio: [0, 1, 2].map(|axis| rms[axis] / self.noise(axis)),
+            range: [0, 1, 2].map(|axis| self.range[axis].map(|end| more(end, axis))),
+        }
+    }
+
     /// The ratio of the worst axis.
     pub fn worst_ratio(&self) -> f64 {
         self.ratio.into_iter().fold(0.0, f64::max)

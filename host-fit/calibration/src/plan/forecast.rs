@@ -3,6 +3,7 @@
 use super::run::PlannedRun;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::estimator::dynamics::ARM_M;
 use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::{FALL_PER_M, FieldParameters};
@@ -70,6 +71,15 @@ pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
                 vertical: [at[3][0], at[4][0], at[5][0]],
                 reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
                 rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
+                vertical_rate: [at[3][1], at[4][1], at[5][1]],
+                acceleration_m_s2: std::array::from_fn(|axis| {
+                    at[axis][2]
+                        * if [2, 4, 5].contains(&axis) {
+                            ARM_M
+                        } else {
+                            1.0
+                        }
+                }),
             }
         };
         rows.extend((0..(run.seconds / step_s).floor() as usize).map(row));

@@ -100,7 +100,7 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {}, which the errors leave out", counted(*rows, "row")),
         Kind::LateReference { lag_us, periods } => {
             let (lag_us, periods, way) = (lag_us.abs(), periods.abs(), way(*lag_us));
-            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account")
+            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account, but the log does not show which of them is late. If all probes are late, the pose is late in service")
         }
         Kind::AtLimit { parameter, shown: (value, unit), .. } => {
             format!("the parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})")
@@ -113,6 +113,10 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::OtherMotion { micro, service_micro, unit, .. } => {
             let unit = sign(unit);
             format!("the log moves {on} by {micro:.0} {unit} to either side, service by {service_micro:.0} {unit} ([motion] in stage.toml)")
+        }
+        Kind::InMotion { ratio, corrected_ratio, acceleration_m_s2, speed_mm_s, is_determined, lag_us: [a, b, c] } => {
+            let known = if *is_determined { "" } else { ". The log does not show what acceleration does to the probes" };
+            format!("in the motion that [motion] in stage.toml declares for service, errors are {ratio:.2} times the noise floor, and {corrected_ratio:.2} times with the correction by commanded speed and acceleration. Without it they are good up to {acceleration_m_s2:.2} m/s² and {speed_mm_s:.1} mm/s rms. Probes A, B, C are read {a:.0}, {b:.0}, {c:.0} µs after their mean{known}")
         }
         Kind::BeyondRange { rows, of } => {
             format!("{rows} of {of} rows are beyond the range of the logs that the parameter blob was fitted to, so the blob extrapolates")

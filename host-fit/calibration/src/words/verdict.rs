@@ -31,5 +31,11 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         let within_k = validity.within_k;
         format!("; good within {within_k:.digits$} K of the temperature of calibration{logged}")
     });
-    format!("errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}")
+    let motion = diagnosis.motion.map_or(String::new(), |motion| {
+        let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
+        format!("; up to {acceleration:.2} m/s² and {speed:.0} mm/s rms")
+    });
+    format!(
+        "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}{motion}"
+    )
 }

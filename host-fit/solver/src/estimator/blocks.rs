@@ -1,5 +1,6 @@
 //! What the model makes of rows: residuals, and means over blocks with their derivatives.
 
+use super::dynamics::Dynamics;
 use super::probe::{Probe, Reading};
 use super::rows::{FieldRow, Rows};
 use super::terms::PER_PROBE;
@@ -21,16 +22,24 @@ pub struct Block {
     pub by_parameter: [[f64; PER_PROBE]; 3],
     /// Derivatives by the lag of the reference, mm/s.
     pub by_lag: [f64; 3],
+    /// Derivatives by each probe's own lag, mm/s.
+    pub by_probe_lag: [f64; 3],
+    /// Mean of [`FieldRow::acceleration_m_s2`].
+    pub acceleration_m_s2: [f64; 6],
     /// Derivatives by k and h of each probe, mm K.
     pub by_temperature: [[f64; 2]; 3],
 }
 
 impl Rows {
-    /// The blocks at given parameters, lag (s) and offsets of the reference (mm, mm, mrad) by
-    /// movement.
-    pub fn evaluate(&self, probes: &[Probe; 3], lag_s: f64, offsets_mm: &[[f64; 3]]) -> Vec<Block> {
+    /// The blocks at given parameters and offsets of the reference (mm, mm, mrad) by movement.
+    pub fn evaluate(
+        &self,
+        probes: &[Probe; 3],
+        dynamics: &Dynamics,
+        offsets_mm: &[[f64; 3]],
+    ) -> Vec<Block> {
         let of_movement = |(movement, &offset_mm): (usize, &[f64; 3])| {
-            self.evaluate_movement(movement, probes, lag_s, offset_mm)
+            self.evaluate_movement(movement, probes, dynamics, offset_mm)
         };
         offsets_mm
             .par_iter()
@@ -44,13 +53,13 @@ impl Rows {
         &self,
         movement: usize,
         probes: &[Probe; 3],
-        lag_s: f64,
+        dynamics: &Dynamics,
         offset_mm: [f64; 3],
     ) -> Vec<Block> {
         self.blocks[self.movements[movement].clone()]
             .par_iter()
             .with_min_len(64)
-            .map(|block| mean(&self.rows[block.clone()], probes, lag_s, offset_mm))
+            .map(|block| mean(&self.rows[block.clone()], probes, dynamics, offset_mm))
             .collect()
     }
 
@@ -58,15 +67,16 @@ impl Rows {
     pub fn residuals_mm(
         &self,
         probes: &[Probe; 3],
-        lag_s: f64,
+        dynamics: &Dynamics,
         offsets_mm: &[[f64; 3]],
     ) -> Vec<[f64; 3]> {
         let of_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
             let residual = move |row: &FieldRow| {
-                let planar_mm = row.planar_mm(lag_s, offset);
                 [0, 1, 2].map(|k| {
+                    let [planar_mm, vertical] = row.pose(dynamics, k, offset);
                     let gain = probes[k].gain(row.temperature_k[k]);
-                    row.signal_mm[k] - gain * probes[k].signal_mm(planar_mm, row.vertical)
+                    let read_mm = row.signal_mm[k] - dynamics.added_mm(k, row.acceleration_m_s2);
+                    read_mm - gain * probes[k].signal_mm(planar_mm, vertical)
                 })
             };
             self.rows[range].par_iter().with_min_len(256).map(residual)
@@ -76,7 +86,7 @@ impl Rows {
     }
 }
 
-fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3]) -> Block {
+fn mean(rows: &[FieldRow], probes: &[Probe; 3], dynamics: &Dynamics, offset_mm: [f64; 3]) -> Block {
     let mut sum = Block {
         time_s: 0.0,
         rows: 0.0,
@@ -84,21 +94,27 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
         by_pose: [[0.0; 3]; 3],
         by_parameter: [[0.0; PER_PROBE]; 3],
         by_lag: [0.0; 3],
+        by_probe_lag: [0.0; 3],
+        acceleration_m_s2: [0.0; 6],
         by_temperature: [[0.0; 2]; 3],
     };
     for row in rows {
-        let planar_mm = row.planar_mm(lag_s, offset_mm);
         sum.rows += row.weight;
         sum.time_s += row.weight * row.time_s;
+        for (sum, x) in sum.acceleration_m_s2.iter_mut().zip(row.acceleration_m_s2) {
+            *sum += row.weight * x;
+        }
         for (k, probe) in probes.iter().enumerate() {
+            let [planar_mm, vertical] = row.pose(dynamics, k, offset_mm);
             let Reading {
                 signal_mm,
                 by_pose,
+                by_vertical,
                 by_parameter,
-                ..
-            } = probe.read(planar_mm, row.vertical);
+            } = probe.read(planar_mm, vertical);
             let gain = probe.gain(row.temperature_k[k]);
-            sum.residual_mm[k] += row.weight * (row.signal_mm[k] - gain * signal_mm);
+            let read_mm = row.signal_mm[k] - dynamics.added_mm(k, row.acceleration_m_s2);
+            sum.residual_mm[k] += row.weight * (read_mm - gain * signal_mm);
             for (sum, temperature_k) in sum.by_temperature[k].iter_mut().zip(row.temperature_k[k]) {
                 *sum += row.weight * signal_mm * temperature_k;
             }
@@ -106,6 +122,9 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
                 let by = row.weight * gain * by;
                 sum.by_pose[k][axis] += by;
                 sum.by_lag[k] += by * row.rate_mm_per_s[axis];
+                let by_vertical = row.weight * gain * by_vertical[axis];
+                sum.by_probe_lag[k] -= by * row.rate_mm_per_s[axis];
+                sum.by_probe_lag[k] -= by_vertical * row.vertical_rate[axis];
             }
             for (sum, by) in sum.by_parameter[k].iter_mut().zip(by_parameter) {
                 *sum += row.weight * gain * by;
@@ -114,9 +133,11 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
     }
     let share = 1.0 / sum.rows;
     sum.time_s *= share;
+    sum.acceleration_m_s2.iter_mut().for_each(|x| *x *= share);
     for k in 0..3 {
         sum.residual_mm[k] *= share;
         sum.by_lag[k] *= share;
+        sum.by_probe_lag[k] *= share;
         sum.by_pose[k].iter_mut().for_each(|x| *x *= share);
         sum.by_parameter[k].iter_mut().for_each(|x| *x *= share);
         sum.by_temperature[k].iter_mut().for_each(|x| *x *= share);

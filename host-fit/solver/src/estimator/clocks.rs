@@ -1,6 +1,7 @@
 //! What is wrong with the clocks of a record: the lag of the reference and how it grows, fitted
 //! together with all that a stage as designed may differ in.
 
+use super::dynamics::Dynamics;
 use super::noise::{USUAL_DRIFT_MM, white_mm};
 use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
 use super::probe::probes;
@@ -126,7 +127,13 @@ impl<'s> Alignment<'s> {
             rows,
             places: self.places,
             noise: Noise {
-                white_mm: white_mm(rows, &probes, 0.0, &point.offsets, self.stage),
+                white_mm: white_mm(
+                    rows,
+                    &probes,
+                    &Dynamics::default(),
+                    &point.offsets,
+                    self.stage,
+                ),
                 drift_mm: USUAL_DRIFT_MM,
             },
             resets_mm: None,

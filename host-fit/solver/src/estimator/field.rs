@@ -1,9 +1,10 @@
 //! Maximum a posteriori: Gauss-Newton on the Hall residuals, first under white noise, then whitened
 //! by the noise that the residuals show.
 
+use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
-use super::parameters::{FieldParameters, unknowns};
+use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
 use super::rows::Rows;
@@ -46,6 +47,8 @@ pub struct FieldFit {
     pub posterior: Posterior,
     /// Lag of the reference behind the probes; `None` where the log shows nothing of it.
     pub lag: Option<ReferenceLag>,
+    /// Lags of the probes, and what acceleration adds to their readings.
+    pub motion: MotionFit,
     /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
     pub offsets_mm: Vec<[f64; 3]>,
     /// The weights of the rows used.
@@ -114,6 +117,8 @@ pub struct WhiteFit {
     noise: Noise,
     resets_mm: Option<[f64; 3]>,
     iterations: u32,
+    /// Whether the log determines what acceleration adds to the readings; otherwise that is held at zero.
+    shows_acceleration: bool,
     /// The parameters of Model (31).
     start: Parameters,
 }
@@ -147,13 +152,14 @@ impl WhiteFit {
                 offsets: vec![[0.0; 3]; rows.movements.len()],
             },
             rows,
-            unknowns: unknowns(&places, sensors.deviations()),
+            unknowns: unknowns(&places, sensors.deviations(), HELD),
             temperature: dataset.temperature,
             sensors,
             places,
             noise: white_only([1.0; 3]),
             resets_mm: stage.resets_mm(),
             iterations: 0,
+            shows_acceleration: false,
             start: *start,
         }
     }
@@ -209,7 +215,7 @@ impl WhiteFit {
     pub fn finish(mut self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
         let mut covariance = self.covariance(&self.normal()?)?;
         // White noise alone makes the errors too small, never too large: what fails here, fails.
-        let early = self.comparison(stage, &self.posterior(covariance));
+        let early = self.comparison(stage, &self.posterior(&covariance));
         if early.loses() {
             return Err(FieldFitError::NotCarried(Box::new(early)));
         }
@@ -219,9 +225,11 @@ impl WhiteFit {
         for _ in 0..NOISE_ROUNDS {
             covariance = self.covariance(&normal)?;
             let white_mm = self.white_mm(stage);
-            let blocks =
-                self.rows
-                    .evaluate(&probes(&self.parameters()), self.lag_s(), &self.at.offsets);
+            let blocks = self.rows.evaluate(
+                &probes(&self.parameters()),
+                &self.dynamics(),
+                &self.at.offsets,
+            );
             self.noise = Noise {
                 white_mm,
                 drift_mm: drift_mm(&self.rows, &blocks, white_mm, &covariance),
@@ -232,9 +240,14 @@ impl WhiteFit {
         }
         let covariance = self.covariance(&normal)?;
         let lag = ReferenceLag {
-            value_s: self.lag_s(),
+            value_s: self.at.values[LAG],
             standard_error_s: covariance[(LAG, LAG)].sqrt(),
         };
+        let motion = MotionFit::new(
+            self.at.values.as_slice(),
+            &covariance,
+            self.shows_acceleration,
+        );
         let (posterior, temperature) = self.with_temperature(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
@@ -263,6 +276,7 @@ impl WhiteFit {
                 ..self.parameters()
             },
             lag: (lag.standard_error_s > 0.0).then_some(lag),
+            motion,
             offsets_mm: self.at.offsets,
             weights: self.weights,
             iterations: self.iterations,
@@ -275,7 +289,7 @@ impl WhiteFit {
         let mut temperature = self.temperature;
         for of in Coefficient::ALL {
             if self.sensors.spans_k[of.sensor] > 0.0 {
-                let change = self.at.values[of.unknown()];
+                let change = self.at.values[of.row()];
                 temperature.per_mk[of.probe][of.sensor] += 1e-3 * change;
             }
         }
@@ -284,7 +298,7 @@ impl WhiteFit {
         let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
         let signal_to_noise = mean_square / (white_mm * white_mm);
         self.sensors.complete(&mut covariance, signal_to_noise);
-        let of_parameters = self.posterior(covariance.clone());
+        let of_parameters = self.posterior(&covariance);
         let posterior = match temperature.is_used() {
             true => of_parameters.with_temperature(&covariance),
             false => of_parameters,
@@ -301,8 +315,8 @@ impl WhiteFit {
         self.equations().parameters(&self.at)
     }
 
-    fn lag_s(&self) -> f64 {
-        self.at.values[LAG]
+    fn dynamics(&self) -> Dynamics {
+        Dynamics::from_values(self.at.values.as_slice())
     }
 
     fn equations(&self) -> FieldEquations<'_> {
@@ -326,7 +340,7 @@ impl WhiteFit {
             .ok_or(FieldFitError::Singular)
     }
 
-    fn posterior(&self, covariance: DMatrix<f64>) -> Posterior {
+    fn posterior(&self, covariance: &DMatrix<f64>) -> Posterior {
         Posterior::new(covariance, &self.parameters(), &self.noise)
     }
 
@@ -338,19 +352,33 @@ impl WhiteFit {
 
     fn white_mm(&self, stage: &Stage) -> [f64; 3] {
         let probes = probes(&self.parameters());
-        white_mm(&self.rows, &probes, self.lag_s(), &self.at.offsets, stage)
+        white_mm(
+            &self.rows,
+            &probes,
+            &self.dynamics(),
+            &self.at.offsets,
+            stage,
+        )
     }
 
     fn weights_by(&self, loss: Loss) -> Vec<f64> {
         let probes = probes(&self.parameters());
         let residuals_mm = self
             .rows
-            .residuals_mm(&probes, self.lag_s(), &self.at.offsets);
+            .residuals_mm(&probes, &self.dynamics(), &self.at.offsets);
         loss.weights(residuals_mm, self.rows.movement_rows())
     }
 
     fn under_white_noise(&mut self, stage: &Stage, limits: Limits) -> Result<(), FieldFitError> {
         self.noise = white_only(self.white_mm(stage));
+        if !self.shows_acceleration {
+            let open = unknowns(&self.places, self.sensors.deviations(), PER_ACCELERATION);
+            let covariance = open.covariance(&self.normal()?);
+            if covariance.is_some_and(|all| MotionFit::determines(&all)) {
+                self.unknowns = open;
+                self.shows_acceleration = true;
+            }
+        }
         self.descend(limits)?;
         Ok(())
     }

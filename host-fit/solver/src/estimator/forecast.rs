@@ -1,5 +1,6 @@
 //! The posterior of a log that is not recorded yet: it does not depend on the residuals.
 
+use super::dynamics::Dynamics;
 use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, covariance_at, temperature_errors};
 use super::probe::probes;
@@ -55,7 +56,7 @@ impl Forecaster {
     /// determine the parameters.
     pub fn forecast(&self, rows: &Rows, weight: f64) -> Option<Forecast> {
         let covariance = self.covariance(rows, weight, [HELD; 2])?;
-        let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
+        let posterior = Posterior::new(&covariance, &self.parameters, &self.noise);
         let service = self.service.variance(&posterior.covariance);
         Some(Forecast { posterior, service })
     }
@@ -74,7 +75,7 @@ impl Forecaster {
         // Of a sine.
         let rms_to_noise = amplitude_mm.fold(0.0, f64::max) / (f64::sqrt(2.0) * white_mm);
         sensors.complete(&mut covariance, rms_to_noise * rms_to_noise);
-        let posterior = Posterior::new(covariance.clone(), &self.parameters, &self.noise);
+        let posterior = Posterior::new(&covariance, &self.parameters, &self.noise);
         let posterior = posterior.with_temperature(&covariance);
         let ratios = distances_k.iter().map(|distance_k| {
             let there = covariance_at(&posterior.covariance, &self.parameters, *distance_k);
@@ -88,7 +89,8 @@ impl Forecaster {
 
     fn covariance(&self, rows: &Rows, weight: f64, temperature: [f64; 2]) -> Option<DMatrix<f64>> {
         let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
-        let mut blocks = rows.evaluate(&probes(&self.parameters), 0.0, &offsets_mm);
+        let mut blocks =
+            rows.evaluate(&probes(&self.parameters), &Dynamics::default(), &offsets_mm);
         blocks.iter_mut().for_each(|block| block.rows *= weight);
         let places = self.parameters.places;
         let equations = FieldEquations {
@@ -98,6 +100,6 @@ impl Forecaster {
             resets_mm: None,
             faults: &[],
         };
-        unknowns(&places, temperature).covariance(&equations.sum_blocks(&blocks))
+        unknowns(&places, temperature, HELD).covariance(&equations.sum_blocks(&blocks))
     }
 }

@@ -9,6 +9,8 @@
 //! | [`motion`] | the motions that show a parameter |
 //! | [`draw`] | the rows that a fit draws |
 //! | [`rows`] | the rows of a log |
+//! | [`derivatives`] | acceleration from rows |
+//! | [`dynamics`] | what motion adds to the readings: lags of the probes, acceleration |
 //! | [`blocks`] | residuals and derivatives of rows, as means over a few |
 //! | [`probe`] | what a probe reads, with derivatives |
 //! | [`gauss_newton`] | damped Gauss-Newton with a prior, for all models |
@@ -16,7 +18,7 @@
 //! | [`pose`] | Models (12) to (31) by the errors of the pose |
 //! | [`linear`] | their linear form: an arbitrary gain in place of lever arms, angles and eta |
 //! | [`least_squares`] | their fit |
-//! | [`sandwich`] | their standard errors, and the lag of the reference |
+//! | [`sandwich`] | their standard errors, and the lags of reference and probes |
 //! | [`zero_deviation`] | the zero deviation of each movement |
 //! | [`robust`] | rows that the model does not explain count less |
 //! | [`whiten`] | the normal equations of the field model under drift |
@@ -31,7 +33,9 @@
 
 pub mod blocks;
 pub mod clocks;
+mod derivatives;
 pub mod draw;
+pub mod dynamics;
 pub mod error;
 pub mod field;
 pub mod forecast;

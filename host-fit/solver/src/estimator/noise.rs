@@ -1,10 +1,10 @@
 //! The noise of a log from the residuals of a fit: white at the probes, a walk of the reference.
 
 use super::blocks::Block;
+use super::dynamics::Dynamics;
 use super::probe::Probe;
 use super::rows::Rows;
-use super::terms::PER_PROBE;
-use super::whiten::{LAG, Noise, UNKNOWNS};
+use super::whiten::{COLUMNS, Noise, UNKNOWNS, columns};
 use crate::estimator::robust::HALF;
 use crate::statistics::SecondDifferences;
 use hallstage_input::stage::Stage;
@@ -22,12 +22,12 @@ const PART_MIN: f64 = 0.5;
 pub fn white_mm(
     rows: &Rows,
     probes: &[Probe; 3],
-    lag_s: f64,
+    dynamics: &Dynamics,
     offsets_mm: &[[f64; 3]],
     stage: &Stage,
 ) -> [f64; 3] {
     let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-    let residuals = rows.residuals_mm(probes, lag_s, offsets_mm);
+    let residuals = rows.residuals_mm(probes, dynamics, offsets_mm);
     let mut noise = SecondDifferences::default();
     for movement in rows.movement_rows() {
         let of_rows = residuals[movement.clone()].windows(3);
@@ -158,6 +158,7 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
     };
     for block in blocks {
         let by_probe = to_rows(&inverse(&from_rows(&block.by_pose))?);
+        let columns: [[f64; COLUMNS]; 3] = columns(block);
         sum.rows += block.rows;
         sum.time_s += block.rows * block.time_s;
         for (axis, row) in by_probe.iter().enumerate() {
@@ -166,10 +167,7 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
                 let white = per_mm * white_mm[probe];
                 sum.error[axis] += weight * block.residual_mm[probe];
                 sum.white[axis] += block.rows * white * white;
-                let by = &mut sum.by_unknown[axis];
-                by[LAG] += weight * block.by_lag[probe];
-                let own = &mut by[probe * PER_PROBE..(probe + 1) * PER_PROBE];
-                for (sum, x) in own.iter_mut().zip(&block.by_parameter[probe]) {
+                for (sum, x) in sum.by_unknown[axis].iter_mut().zip(&columns[probe]) {
                     *sum += weight * x;
                 }
             }

@@ -1,10 +1,11 @@
 //! The values of the 81 parameters, and the decoder's constants made of them.
 
+use super::dynamics::PROBE_LAG_S;
 use super::temperature::Coefficient;
 use super::terms::{
     CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
 };
-use super::whiten::UNKNOWNS;
+use super::whiten::{ACCELERATIONS, PROBE_LAGS, UNKNOWNS};
 use crate::estimator::gauss_newton::Unknowns;
 use crate::estimator::paper::Parameters;
 use hallstage_input::stage::Stage;
@@ -242,11 +243,12 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
     ([x, y], [[by(-c, x), -a * share], [by(b, y), a * share]])
 }
 
-/// Standard deviation of a temperature coefficient that stays at its prior, 1/K.
+/// Standard deviation of a temperature coefficient (1/K) or a change by acceleration (mm per m/s2) that stays at its prior.
 pub const HELD: f64 = 1e-9;
 
-/// All parameters, the lag, k and h with their prior; `temperature` are the prior standard deviations of k and h.
-pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2]) -> Unknowns {
+/// All unknowns with their prior: `temperature` are the prior standard deviations of k and h, `acceleration` of the
+/// changes by acceleration.
+pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2], acceleration: f64) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {
         let own = probe * PER_PROBE;
@@ -267,7 +269,15 @@ pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2]) -> Unknowns {
     }
     for of in Coefficient::ALL {
         let deviation = temperature[of.sensor];
-        prior[(of.unknown(), of.unknown())] = 1.0 / (deviation * deviation);
+        prior[(of.row(), of.row())] = 1.0 / (deviation * deviation);
+    }
+    let (a, b) = (PROBE_LAGS, PROBE_LAGS + 1);
+    // The lag of each probe has this deviation; the lag of C is the negative sum.
+    let weight = 1.0 / (PROBE_LAG_S * PROBE_LAG_S);
+    (prior[(a, a)], prior[(b, b)]) = (2.0 * weight, 2.0 * weight);
+    (prior[(a, b)], prior[(b, a)]) = (weight, weight);
+    for k in ACCELERATIONS..UNKNOWNS {
+        prior[(k, k)] = 1.0 / (acceleration * acceleration);
     }
     Unknowns {
         origin: DVector::zeros(UNKNOWNS),

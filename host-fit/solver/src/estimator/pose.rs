@@ -17,12 +17,15 @@ use hallstage_input::stage::Stage;
 use runtime::matrix::{inverse, to_rows};
 use std::ops::Range;
 
-/// Columns: the parameters, the lag of the reference, the residual.
-pub const COLUMNS: usize = COUNT + 2;
+/// Columns: the parameters, the lag of the reference, the lags of A and B behind the mean of the probes (that of C is
+/// the negative sum), the residual.
+pub const COLUMNS: usize = COUNT + 4;
 /// Place of the lag.
 pub const LAG: usize = COUNT;
+/// Place of the lags of the probes.
+pub const PROBE_LAGS: usize = COUNT + 1;
 /// Place of the residual.
-pub const ERROR: usize = COUNT + 1;
+pub const ERROR: usize = COUNT + 3;
 
 /// A row with phi below this part of eta is next to a pole.
 pub const SHARE_MIN: f64 = 0.05;
@@ -99,11 +102,25 @@ impl Decoder {
         } = self.decode(row)?;
         let mut columns = [[0.0; COLUMNS]; 3];
         for (k, probe) in self.probes.iter().enumerate() {
-            let by_parameter = probe.read(planar_mm, row.vertical).by_parameter;
+            let read = probe.read(planar_mm, row.vertical);
+            let by_planar = read.by_pose.iter().zip(row.rate_mm_per_s);
+            let by_vertical = read.by_vertical.iter().zip(row.vertical_rate);
+            let rate_mm_per_s: f64 = by_planar
+                .chain(by_vertical)
+                .map(|(by, rate)| by * rate)
+                .sum();
             for (axis, column) in columns.iter_mut().enumerate() {
                 let to_pose = -self.inverse[axis][k] / phi[k];
-                for (term, by) in by_parameter[..CARRY].iter().enumerate() {
+                for (term, by) in read.by_parameter[..CARRY].iter().enumerate() {
                     column[3 * term + k] = to_pose * by;
+                }
+                let by_lag = -to_pose * rate_mm_per_s;
+                match k {
+                    2 => {
+                        column[PROBE_LAGS] -= by_lag;
+                        column[PROBE_LAGS + 1] -= by_lag;
+                    }
+                    _ => column[PROBE_LAGS + k] += by_lag,
                 }
             }
         }

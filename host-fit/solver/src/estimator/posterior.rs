@@ -4,7 +4,7 @@ use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
 use super::temperature::Coefficient;
 use super::terms::{self, CARRY, COUNT, PER_PROBE};
-use super::whiten::{LAG, Noise};
+use super::whiten::Noise;
 use crate::estimator::model;
 use nalgebra::{DMatrix, Matrix3};
 use runtime::matrix::{from_rows, inverse, to_rows};
@@ -96,8 +96,9 @@ pub fn temperature_errors(covariance: &DMatrix<f64>) -> Option<[[f64; 2]; 3]> {
 }
 
 impl Posterior {
-    pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
-        let covariance = with_lag.view((0, 0), (COUNT, COUNT)).into_owned();
+    /// `all` is the covariance of all unknowns.
+    pub(super) fn new(all: &DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
+        let covariance = all.view((0, 0), (COUNT, COUNT)).into_owned();
         Self::from_covariance(covariance, parameters, noise)
     }
 
@@ -166,10 +167,11 @@ impl Posterior {
         pairs
     }
 
-    /// The posterior with k and h; `with_lag` is the covariance of all unknowns.
+    /// The posterior with k and h; `all` is the covariance of all unknowns.
     #[must_use]
-    pub(super) fn with_temperature(mut self, with_lag: &DMatrix<f64>) -> Self {
-        self.covariance = with_lag.clone().remove_row(LAG).remove_column(LAG);
+    pub(super) fn with_temperature(mut self, all: &DMatrix<f64>) -> Self {
+        let rows = Coefficient::ROWS;
+        self.covariance = all.view((0, 0), (rows, rows)).into_owned();
         self.determined = (0..self.covariance.nrows()).collect();
         self
     }
@@ -252,8 +254,8 @@ mod tests {
             let (up, down) = (moved(error), moved(-error));
             let mut covariance = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
             covariance[(k, k)] = error * error;
-            let at_pose = |covariance| {
-                let posterior = Posterior::new(covariance, &truth, &noise);
+            let at_pose = |covariance: DMatrix<f64>| {
+                let posterior = Posterior::new(&covariance, &truth, &noise);
                 posterior.at_pose(planar, vertical).expect("a pose")
             };
             // Errors of the form act as the noise of the probes does.

@@ -4,8 +4,10 @@
 //! holds their information on the parameters, and is a tenth of the work for all that follows. The
 //! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
+use super::derivatives::{SECOND, SIDE};
+use super::dynamics::{ARM_M, Dynamics};
 use crate::estimator::robust::HALF;
-use hallstage_input::dataset::Dataset;
+use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,6 +25,8 @@ const MOVING_ROWS_MIN: usize = 8;
 const IDLE_ROWS: usize = 2;
 /// A movement of less than this share of the largest one stands still.
 const IDLE_SHARE: f64 = 0.01;
+/// Steps between rows that differ by more than this part of their mean are no even samples.
+const UNEVEN: f64 = 0.2;
 
 /// One row.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +41,10 @@ pub struct FieldRow {
     pub reference_mm: [f64; 3],
     /// Its change by time: mm/s, mm/s, mrad/s.
     pub rate_mm_per_s: [f64; 3],
+    /// Change of Z, Rx, Ry by time: m/s, rad/s, rad/s.
+    pub vertical_rate: [f64; 3],
+    /// Acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, m/s2; 0 where rows are missing.
+    pub acceleration_m_s2: [f64; 6],
     /// dM and dH over the gain of A, B, C that [`Self::signal_mm`] is compensated for, K.
     pub temperature_k: [[f64; 2]; 3],
     /// How much it counts: 1 unless a robust loss says less.
@@ -218,26 +226,23 @@ impl FieldRow {
         let at = |k: usize| (self.reference_mm[k] + self.rate_mm_per_s[k] * lag_s) + offset_mm[k];
         [at(0), at(1), at(2)]
     }
+
+    /// X, Y, Rz (mm, mm, mrad) and Z, Rx, Ry (m, rad, rad) when a probe was read.
+    #[inline(always)]
+    pub fn pose(&self, dynamics: &Dynamics, probe: usize, offset_mm: [f64; 3]) -> [[f64; 3]; 2] {
+        let late_s = dynamics.probe_lag_s[probe];
+        let vertical = |k: usize| self.vertical[k] - self.vertical_rate[k] * late_s;
+        [
+            self.planar_mm(dynamics.lag_s - late_s, offset_mm),
+            [0, 1, 2].map(vertical),
+        ]
+    }
 }
 
 fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> FieldRow {
     let row = &dataset.rows[index];
-    let neighbour = |k: Option<usize>| {
-        let found = k.filter(|&k| trusted.get(k) == Some(&true));
-        let found = found.map(|k| &dataset.rows[k]);
-        found
-            .filter(|other| other.movement == row.movement)
-            .unwrap_or(row)
-    };
-    let (before, after) = (
-        neighbour(index.checked_sub(1)),
-        neighbour(index.checked_add(1)),
-    );
-    let time_s = (after.t_us - before.t_us) as f64 * 1e-6;
-    let rate = |k: usize| {
-        let moved = (after.reference[k] - before.reference[k]) * 1e3;
-        if time_s > 0.0 { moved / time_s } else { 0.0 }
-    };
+    let rate = speed(dataset, index, trusted);
+    let [x, y, rz, z, rx, ry] = acceleration(dataset, index, trusted);
     let temperature = &dataset.temperature;
     let temperature_mc = row.frame.temperature_mc();
     let changes_k = temperature.changes_k(temperature_mc);
@@ -248,9 +253,83 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
         signal_mm: row.signal_m.map(|s| s * 1e3),
         vertical: row.vertical,
         reference_mm: row.reference.map(|q| q * 1e3),
-        rate_mm_per_s: [rate(0), rate(1), rate(2)],
+        rate_mm_per_s: [0, 1, 2].map(|k| rate[k] * 1e3),
+        vertical_rate: [rate[3], rate[4], rate[5]],
+        acceleration_m_s2: [x, y, ARM_M * rz, z, ARM_M * rx, ARM_M * ry],
         weight,
     }
+}
+
+fn pose(row: &Row) -> [f64; 6] {
+    let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
+    [x, y, rz, z, rx, ry]
+}
+
+/// Speed of X, Y, Rz, Z, Rx, Ry at a row, SI: the difference of its neighbours.
+fn speed(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
+    let row = &dataset.rows[index];
+    let neighbour = |k: Option<usize>| {
+        let found = k.filter(|&k| trusted.get(k) == Some(&true));
+        let found = found.map(|k| &dataset.rows[k]);
+        found
+            .filter(|other| other.movement == row.movement)
+            .unwrap_or(row)
+    };
+    let before = neighbour(index.checked_sub(1));
+    let after = neighbour(index.checked_add(1));
+    let time_s = (after.t_us - before.t_us) as f64 * 1e-6;
+    let (from, to) = (pose(before), pose(after));
+    let change = |k: usize| {
+        if time_s > 0.0 {
+            (to[k] - from[k]) / time_s
+        } else {
+            0.0
+        }
+    };
+    std::array::from_fn(change)
+}
+
+/// Acceleration of X, Y, Rz, Z, Rx, Ry at a row, SI; near an end of a movement that of the nearest row with a whole window, and zero
+/// where rows are missing.
+fn acceleration(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
+    let movement = &dataset.movements[dataset.rows[index].movement].rows;
+    let middle = index
+        .min(movement.end.saturating_sub(SIDE + 1))
+        .max(movement.start + SIDE);
+    let window = middle - SIDE..middle + SIDE + 1;
+    let mut sum = [0.0; 6];
+    if window.end > movement.end || trusted[window.clone()].contains(&false) {
+        return sum;
+    }
+    let window = &dataset.rows[window];
+    let Some(period_s) = period_s(window) else {
+        return sum;
+    };
+    for (row, weight) in window.iter().zip(SECOND) {
+        for (sum, x) in sum.iter_mut().zip(pose(row)) {
+            *sum += weight * x;
+        }
+    }
+    sum.map(|sum| sum / (period_s * period_s))
+}
+
+/// The time between rows where all steps are alike.
+fn period_s(rows: &[Row]) -> Option<f64> {
+    let steps = || rows.windows(2).map(|pair| pair[1].t_us - pair[0].t_us);
+    let (least, most) = (steps().min()?, steps().max()?);
+    let mean_s = steps().sum::<i64>() as f64 * 1e-6 / (rows.len() - 1) as f64;
+    (least > 0 && (most - least) as f64 <= UNEVEN * least as f64).then_some(mean_s)
+}
+
+/// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI.
+pub fn planar_motion(dataset: &Dataset) -> Vec<[[f64; 3]; 2]> {
+    let trusted = vec![true; dataset.rows.len()];
+    let at = |index: usize| {
+        let [x, y, rz, ..] = speed(dataset, index, &trusted);
+        let [by_x, by_y, by_rz, ..] = acceleration(dataset, index, &trusted);
+        [[x, y, rz], [by_x, by_y, by_rz]]
+    };
+    (0..dataset.rows.len()).into_par_iter().map(at).collect()
 }
 
 /// How far a movement moves: the largest range of X, Y (mm) and Rz (mrad) by the reference.
@@ -274,6 +353,8 @@ fn mean_row(rows: &[FieldRow]) -> FieldRow {
         vertical: three(&|row| row.vertical),
         reference_mm: three(&|row| row.reference_mm),
         rate_mm_per_s: three(&|row| row.rate_mm_per_s),
+        vertical_rate: three(&|row| row.vertical_rate),
+        acceleration_m_s2: std::array::from_fn(|axis| mean(&|row| row.acceleration_m_s2[axis])),
         temperature_k: [0, 1, 2]
             .map(|k| [0, 1].map(|sensor| mean(&|row| row.temperature_k[k][sensor]))),
         weight,

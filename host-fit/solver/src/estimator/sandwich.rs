@@ -6,8 +6,9 @@
 //! them. The standard error as if rows were independent is a lower
 //! bound, so that a chance cancellation within few clusters does no harm.
 
+use super::dynamics::MotionFit;
 use super::parameters::FieldParameters;
-use super::pose::{COLUMNS, Columns, Decoder, ERROR, LAG};
+use super::pose::{COLUMNS, Columns, Decoder, ERROR, LAG, PROBE_LAGS};
 use super::posterior::Posterior;
 use super::terms::PER_PROBE;
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
@@ -17,7 +18,7 @@ use crate::estimator::problem::Problem;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
-/// Unknowns: the parameters and the lag.
+/// Unknowns: the parameters and the lags.
 const UNKNOWNS: usize = COLUMNS - 1;
 type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Column = SVector<f64, UNKNOWNS>;
@@ -52,6 +53,8 @@ pub struct Sandwich {
     pub undetermined: Vec<ParameterId>,
     /// The lag, one Gauss-Newton step from none with all parameters; `None` where no motion shows it.
     pub lag: Option<ReferenceLag>,
+    /// The lags of the probes, by the same step.
+    pub motion: MotionFit,
 }
 
 /// The standard errors of some unknowns.
@@ -100,6 +103,7 @@ impl Sandwich {
                 .filter(|id| errors.undetermined.contains(&id.index))
                 .collect(),
             lag: sums.lag(&free),
+            motion: sums.motion(&free),
         })
     }
 }
@@ -228,6 +232,23 @@ impl Sums {
             errors.clustered[k] = error(&self.clustered);
         }
         errors
+    }
+
+    /// The lags of the probes, with all parameters that are fitted and the lag.
+    fn motion(&self, free: &[usize]) -> MotionFit {
+        let lags = [PROBE_LAGS, PROBE_LAGS + 1];
+        let with_lags: Vec<usize> = free.iter().copied().chain([LAG]).chain(lags).collect();
+        let errors = self.errors(&with_lags);
+        if lags.iter().any(|&k| errors.standard_error(k).is_none()) {
+            return MotionFit::unknown();
+        }
+        let descent = Column::from_fn(|k, _| self.normal.descent(k));
+        let covariance = errors.inverse * self.clustered * errors.inverse;
+        let values = lags.map(|k| (errors.inverse.row(k) * descent)[0]);
+        MotionFit::with_probe_lags(
+            values,
+            covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS).into(),
+        )
     }
 
     /// The lag with all parameters that are fitted.

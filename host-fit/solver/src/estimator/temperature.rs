@@ -3,7 +3,6 @@
 
 use super::parameters::HELD;
 use super::terms::COUNT;
-use super::whiten::LAG;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -43,14 +42,9 @@ impl Coefficient {
         2 * self.probe + self.sensor
     }
 
-    /// Its row in the covariance of a posterior.
+    /// Its place among the unknowns of a fit and in the covariance of a posterior.
     pub const fn row(self) -> usize {
         COUNT + self.place()
-    }
-
-    /// Its place among the unknowns of a fit.
-    pub const fn unknown(self) -> usize {
-        LAG + 1 + self.place()
     }
 
     /// Its name, for instance `k_a`.
@@ -119,7 +113,7 @@ impl Sensors {
         })
     }
 
-    /// Completes the covariance of k and h, the last rows of a fit's covariance. It adds the errors of the sensors (one
+    /// Completes the covariance of k and h in the covariance of a fit. It adds the errors of the sensors (one
     /// for each log, the same for all probes) and of the form, and takes the prior where they were held in the fit. The gain of a
     /// log follows 1, dM and dH, and is known by its rows: `signal_to_noise` is the mean square of a row's signal over
     /// its noise.
@@ -139,14 +133,13 @@ impl Sensors {
             let error = inverse * along(*change_k) * (rows * signal_to_noise * OF_SENSORS);
             of_sensors += error * error.transpose();
         }
-        let first = covariance.nrows() - Coefficient::ALL.len();
         for coefficient in Coefficient::ALL {
-            let (i, sensor) = (first + coefficient.place(), coefficient.sensor);
+            let (i, sensor) = (coefficient.row(), coefficient.sensor);
             for other in Coefficient::ALL {
-                let j = first + other.place();
+                let j = other.row();
                 covariance[(i, j)] += of_sensors[(1 + sensor, 1 + other.sensor)];
             }
-            let other = first + Coefficient::new(coefficient.probe, 1 - sensor).place();
+            let other = Coefficient::new(coefficient.probe, 1 - sensor).row();
             let together = OF_FORM_TOGETHER * OF_FORM_TOGETHER;
             match [sensor, 1 - sensor].map(|sensor| self.spans_k[sensor] > 0.0) {
                 [true, true] => {
@@ -216,20 +209,23 @@ mod tests {
                 by_log: vec![(15_000.0, [0.0; 2]), (4_000.0, [distance_k, 0.0])],
                 prior_per_k: [[-1.2e-3, 3e-4], [0.0, 2e-4]],
             };
-            let mut covariance = DMatrix::zeros(6, 6);
+            let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
             sensors.complete(&mut covariance, 3e5);
             let expected = (4e-5 / distance_k).hypot(OF_FORM_TOGETHER);
             for probe in 0..3 {
-                let error = covariance[(2 * probe, 2 * probe)].sqrt();
+                let k = Coefficient::new(probe, 0).row();
+                let error = covariance[(k, k)].sqrt();
                 assert!(
                     (error / expected - 1.0).abs() < 0.03,
                     "{error:e} {expected:e}"
                 );
             }
             // The sensors' part is the same for all probes, and h is held.
-            let shared = covariance[(0, 4)].sqrt() * distance_k;
+            let [a, c] = [0, 2].map(|probe| Coefficient::new(probe, 0).row());
+            let shared = covariance[(a, c)].sqrt() * distance_k;
             assert!((shared / 4e-5 - 1.0).abs() < 0.03, "{shared:e}");
-            assert!(covariance[(1, 1)] < 1e-20);
+            let h = Coefficient::new(0, 1).row();
+            assert!(covariance[(h, h)] < 1e-20);
         }
     }
 }

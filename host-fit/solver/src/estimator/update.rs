@@ -3,8 +3,9 @@
 //! The prior is normal about the old parameters. Its covariance is the old posterior's plus what
 //! may have changed since, written as L L': the parameters are p = p_old + L x with x standard
 //! normal. This needs no inverse, so a change may be of one parameter or of all, with or without
-//! an old posterior. The lag of the reference is an unknown of every log.
+//! an old posterior. The lags of the reference and of the probes are unknowns of every log.
 
+use super::dynamics::{Dynamics, PROBE_LAG_S};
 use super::error::FieldFitError;
 use super::noise::white_mm;
 use super::parameters::FieldParameters;
@@ -13,7 +14,7 @@ use super::probe::probes;
 use super::rows::Rows;
 use super::temperature::OF_SENSORS;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
-use super::whiten::{COLUMNS, FieldEquations, LAG, Noise, UNKNOWNS};
+use super::whiten::{COLUMNS, FieldEquations, LAG, Noise, PROBE_LAGS, UNKNOWNS};
 use crate::estimator::gauss_newton::{self, Limits, Solved, Unknowns};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
@@ -47,6 +48,8 @@ const SLOPE: f64 = 0.05;
 const PLACE_M: f64 = 5e-3;
 const OF_PRIOR: f64 = 0.2;
 const LAG_S: f64 = 0.01;
+/// Columns of the lags of the reference and of two probes.
+const LAGS: usize = 3;
 
 impl Change {
     /// The columns of L for it, each over the parameters.
@@ -161,7 +164,13 @@ pub fn update(
         rows: &rows,
         places: old.places,
         noise: Noise {
-            white_mm: white_mm(&rows, &probes(old), 0.0, &offsets_mm, stage),
+            white_mm: white_mm(
+                &rows,
+                &probes(old),
+                &Dynamics::default(),
+                &offsets_mm,
+                stage,
+            ),
             drift_mm,
         },
         resets_mm: stage.resets_mm(),
@@ -182,22 +191,22 @@ pub fn update(
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {
-        // The errors of the temperatures belong to this log only. Their column is the last but the lag.
-        lasting.column_mut(changes - 2).fill(0.0);
+        // The errors of the temperatures belong to this log only. Their column is the last before the lags.
+        lasting.column_mut(changes - LAGS - 1).fill(0.0);
     }
     let inverse = unknowns
         .factor(&solved.normal)
         .map(|factor| factor.inverse());
-    let with_lag = inverse.map(|inverse| &lasting * inverse * lasting.transpose());
+    let all = inverse.map(|inverse| &lasting * inverse * lasting.transpose());
     solved.point.values = &unknowns.origin + &lasting * &solved.x;
     let parameters = equations.parameters(&solved.point);
     let prior = unknowns.prior_squares(&solved.x);
     let noise = equations.noise;
-    let with_lag = with_lag.ok_or(FieldFitError::Singular)?;
-    let posterior = Posterior::new(with_lag.clone(), &parameters, &noise);
+    let all = all.ok_or(FieldFitError::Singular)?;
+    let posterior = Posterior::new(&all, &parameters, &noise);
     Ok(Update {
         posterior: match covariance.is_some_and(|covariance| covariance.nrows() > COUNT) {
-            true => posterior.with_temperature(&with_lag),
+            true => posterior.with_temperature(&all),
             false => posterior,
         },
         parameters,
@@ -211,7 +220,7 @@ pub fn update(
     })
 }
 
-/// L, over the parameters and the lag. `None` if `covariance` is no covariance.
+/// L, over all unknowns. `None` if `covariance` is no covariance.
 fn factor(
     old: &FieldParameters,
     covariance: Option<&DMatrix<f64>>,
@@ -219,7 +228,7 @@ fn factor(
 ) -> Option<DMatrix<f64>> {
     let changes = change.columns(old);
     let known = covariance.map_or(0, DMatrix::nrows);
-    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + 1);
+    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + LAGS);
     if let Some(covariance) = covariance {
         // Scaled to a diagonal of ones: the units differ by orders of magnitude.
         let scale = covariance.diagonal().map(f64::sqrt);
@@ -228,10 +237,8 @@ fn factor(
         });
         let scaled = Cholesky::new(scaled)?.unpack();
         for i in 0..known {
-            // k and h stand behind the lag.
-            let unknown = if i < LAG { i } else { i + 1 };
             for j in 0..=i {
-                l[(unknown, j)] = scale[i] * scaled[(i, j)];
+                l[(i, j)] = scale[i] * scaled[(i, j)];
             }
         }
     }
@@ -240,6 +247,8 @@ fn factor(
             l[(i, known + j)] = *value;
         }
     }
-    l[(LAG, known + changes.len())] = LAG_S;
+    let lags = known + changes.len();
+    l[(LAG, lags)] = LAG_S;
+    (l[(PROBE_LAGS, lags + 1)], l[(PROBE_LAGS + 1, lags + 2)]) = (PROBE_LAG_S, PROBE_LAG_S);
     Some(l)
 }

@@ -7,21 +7,26 @@
 //! whitened jointly with C, for all three see the same reference.
 
 use super::blocks::Block;
+use super::dynamics::Dynamics;
 use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::rows::Rows;
 use super::temperature::Coefficient;
-use super::terms::{COUNT, PER_PROBE};
+use super::terms::PER_PROBE;
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
 
-/// Unknowns: the parameters, the lag of the reference, then k and h of A, B, C beyond their priors.
-pub const UNKNOWNS: usize = LAG + 1 + Coefficient::ALL.len();
-/// The column of the lag.
-pub const LAG: usize = COUNT;
+/// The column of the lag of the reference, behind the parameters and k and h of A, B, C beyond their priors.
+pub const LAG: usize = Coefficient::ROWS;
+/// The columns of the lags of A and B behind the mean of the probes; that of C is the negative sum.
+pub const PROBE_LAGS: usize = LAG + 1;
+/// The columns of the changes by acceleration of the six axes, of A, B, C.
+pub const ACCELERATIONS: usize = PROBE_LAGS + 2;
+/// All unknowns.
+pub const UNKNOWNS: usize = ACCELERATIONS + 18;
 /// The column of the lag's growth by time, which an alignment of two clocks takes too.
 pub const LAG_RATE: usize = UNKNOWNS;
-/// Columns: these and the residual.
-pub const COLUMNS: usize = 92;
+/// Columns: these and the residual, a multiple of four.
+pub const COLUMNS: usize = (LAG_RATE + 2).next_multiple_of(4);
 /// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
 const OFFSET_MM: f64 = 1.0;
 
@@ -56,7 +61,7 @@ impl FieldEquations<'_> {
         let values = at.values.as_slice();
         let mut parameters = FieldParameters::from_values(values, self.places);
         for of in Coefficient::ALL {
-            parameters.gain_per_k[of.probe][of.sensor] = values[of.unknown()];
+            parameters.gain_per_k[of.probe][of.sensor] = values[of.row()];
         }
         parameters
     }
@@ -83,11 +88,12 @@ impl FieldEquations<'_> {
     /// The whitened columns at a point and the steps of the filter, block by block.
     pub fn whitened<const W: usize>(&self, at: &Point) -> (Vec<[[f64; W]; 3]>, Vec<Gain>) {
         let probes = probes(&self.parameters(at));
+        let dynamics = Dynamics::from_values(at.values.as_slice());
         let (mut rows, mut gains) = (Vec::new(), Vec::new());
         for (k, offset_mm) in at.offsets.iter().enumerate() {
             let blocks = self
                 .rows
-                .evaluate_movement(k, &probes, at.values[LAG], *offset_mm);
+                .evaluate_movement(k, &probes, &dynamics, *offset_mm);
             self.filter(k, &blocks, *offset_mm, self.sizes(at), |gain, row| {
                 rows.push(row);
                 gains.push(gain);
@@ -165,9 +171,10 @@ impl FieldEquations<'_> {
 impl<const W: usize> Equations<W> for FieldEquations<'_> {
     fn normal(&self, at: &Point) -> Option<Normal<W>> {
         let probes = probes(&self.parameters(at));
+        let dynamics = Dynamics::from_values(at.values.as_slice());
         Normal::sum(self.rows.movements.len(), |k| {
-            let (lag_s, offset_mm) = (at.values[LAG], at.offsets[k]);
-            let blocks = self.rows.evaluate_movement(k, &probes, lag_s, offset_mm);
+            let offset_mm = at.offsets[k];
+            let blocks = (self.rows).evaluate_movement(k, &probes, &dynamics, offset_mm);
             Some(self.sums(k, &blocks, offset_mm, self.sizes(at)))
         })
     }
@@ -177,15 +184,22 @@ type Matrix = [[f64; 3]; 3];
 
 /// Residuals and derivatives of a block.
 #[inline(always)]
-fn columns<const W: usize>(block: &Block) -> [[f64; W]; 3] {
+pub(super) fn columns<const W: usize>(block: &Block) -> [[f64; W]; 3] {
     let mut columns = [[0.0; W]; 3];
     for (probe, column) in columns.iter_mut().enumerate() {
         let own = probe * PER_PROBE;
         column[own..own + PER_PROBE].copy_from_slice(&block.by_parameter[probe]);
         column[LAG] = block.by_lag[probe];
         for (sensor, by) in block.by_temperature[probe].into_iter().enumerate() {
-            column[Coefficient::new(probe, sensor).unknown()] = by;
+            column[Coefficient::new(probe, sensor).row()] = by;
         }
+        let late = block.by_probe_lag[probe];
+        match probe {
+            2 => column[PROBE_LAGS..ACCELERATIONS].fill(-late),
+            _ => column[PROBE_LAGS + probe] = late,
+        }
+        let own = ACCELERATIONS + 6 * probe;
+        column[own..own + 6].copy_from_slice(&block.acceleration_m_s2);
         column[LAG_RATE] = block.by_lag[probe] * block.time_s;
         column[W - 1] = block.residual_mm[probe];
     }
@@ -309,7 +323,7 @@ mod tests {
         let dataset = run.dataset(&parameters());
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
         let rows = Rows::new(&dataset, &all);
-        let blocks = rows.evaluate(&probes(&parameters()), 0.0, &[[0.0; 3]; 2]);
+        let blocks = rows.evaluate(&probes(&parameters()), &Dynamics::default(), &[[0.0; 3]; 2]);
         let noise = Noise {
             white_mm: [5e-4, 4e-4, 6e-4],
             drift_mm: [1e-3, 2e-3, 5e-4],
@@ -344,16 +358,7 @@ mod tests {
                     shared + if i == j { white } else { 0.0 }
                 });
                 let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
-                    let (block, probe) = (&blocks[i / 3], i % 3);
-                    match j {
-                        LAG => block.by_lag[probe],
-                        LAG_RATE => block.by_lag[probe] * block.time_s,
-                        RESIDUAL => block.residual_mm[probe],
-                        _ if j < COUNT && j / PER_PROBE == probe => {
-                            block.by_parameter[probe][j % PER_PROBE]
-                        }
-                        _ => 0.0,
-                    }
+                    columns::<COLUMNS>(&blocks[i / 3])[i % 3][j]
                 });
                 let factor = Cholesky::new(covariance).expect("positive");
                 log_determinant += 2.0 * factor.l().diagonal().map(f64::ln).sum();

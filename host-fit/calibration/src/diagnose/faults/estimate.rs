@@ -4,12 +4,13 @@
 use super::FAULTS_MAX;
 use super::means::Means;
 use crate::diagnose::limits::ROUNDS;
+use hallstage_solver::estimator::dynamics::Dynamics;
 use hallstage_solver::estimator::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
 use hallstage_solver::estimator::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
 use hallstage_solver::estimator::parameters::{FieldParameters, HELD, unknowns};
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
-use hallstage_solver::estimator::whiten::{FieldEquations, Gain, Noise, UNKNOWNS};
+use hallstage_solver::estimator::whiten::{FieldEquations, Gain, LAG, Noise, PROBE_LAGS, UNKNOWNS};
 use nalgebra::{DMatrix, DVector};
 
 /// Columns: the unknowns of the fit, the sizes of the faults, and last the residual; a multiple of four is quick.
@@ -74,7 +75,7 @@ impl Estimate {
     /// Without faults, with the noise of the residuals.
     pub(super) fn faultless(self, means: &Means) -> Option<Self> {
         let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
-        let blocks = (means.rows).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
+        let blocks = (means.rows).evaluate(&probes(parameters), &self.dynamics(), &at.offsets);
         let covariance = self.curvature.inverse();
         noise.drift_mm = drift_mm(&means.rows, &blocks, noise.white_mm, &covariance);
         for (drift_mm, usual_mm) in noise.drift_mm.iter_mut().zip(USUAL_DRIFT_MM) {
@@ -92,9 +93,14 @@ impl Estimate {
         faults: &[Vec<[f64; 3]>],
     ) -> Option<Self> {
         let size = UNKNOWNS + faults.len();
-        let mut prior = unknowns(&places, [HELD; 2]).prior;
-        for k in (0..=COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31) {
+        let mut prior = unknowns(&places, [HELD; 2], means.acceleration).prior;
+        let flat = (0..COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31);
+        for k in flat.chain([LAG]) {
             prior[(k, k)] += 1.0 / (FLAT * FLAT);
+        }
+        // A late probe is a fault that is looked for.
+        for k in [PROBE_LAGS, PROBE_LAGS + 1] {
+            prior[(k, k)] = 1.0 / (HELD * HELD);
         }
         let unknowns = Unknowns {
             origin: DVector::zeros(size),
@@ -144,16 +150,21 @@ impl Estimate {
             let is_sure = value * value > likely * covariance[(k, k)];
             if is_sure { unit_s * value } else { 0.0 }
         };
-        let [x, y1, y2] = [(COUNT, 1.0), (UNKNOWNS, 1e-3), (UNKNOWNS + 1, 1e-3)].map(sure_s);
+        let [x, y1, y2] = [(LAG, 1.0), (UNKNOWNS, 1e-3), (UNKNOWNS + 1, 1e-3)].map(sure_s);
         [x, x + y1, x + y2]
     }
 
     /// The lag of the reference, s.
     pub(super) fn lag_s(&self) -> f64 {
-        self.at.values[COUNT]
+        self.at.values[LAG]
     }
 
-    /// The values of the unknowns: the parameters, the lag of the reference (s), k and h.
+    /// Lags, and changes by acceleration.
+    fn dynamics(&self) -> Dynamics {
+        Dynamics::from_values(self.at.values.as_slice())
+    }
+
+    /// The values of the unknowns.
     pub(super) fn values(&self) -> DVector<f64> {
         self.at.values.rows(0, UNKNOWNS).into_owned()
     }

@@ -5,7 +5,9 @@ use crate::diagnose::limits::{CLEAR, MEANS_MAX, RARITY};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
-use hallstage_solver::estimator::probe::Probe;
+use hallstage_solver::estimator::dynamics::{Dynamics, PER_ACCELERATION};
+use hallstage_solver::estimator::parameters::{FieldParameters, HELD};
+use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::Rows;
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::statistics::white_noise;
@@ -25,14 +27,26 @@ pub(super) struct Means {
     pub(super) white_mm: [f64; 3],
     /// Errors of the resets, mm, mm, mrad, where they are declared.
     pub(super) resets_mm: Option<[f64; 3]>,
+    /// Prior standard deviation of what acceleration adds to the readings, mm per m/s2.
+    pub(super) acceleration: f64,
 }
 
 impl Means {
-    /// The rows of a dataset; `probes` predict its signals.
-    pub(super) fn new(dataset: &Dataset, stage: &Stage, probes: &[Probe; 3]) -> Self {
+    /// The rows of a dataset; `parameters` predict its signals.
+    pub(super) fn new(
+        dataset: &Dataset,
+        stage: &Stage,
+        parameters: &FieldParameters,
+        shows_acceleration: bool,
+    ) -> Self {
+        let probes = &probes(parameters);
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
         let mut rows = Rows::new(dataset, &all);
-        let residuals = rows.residuals_mm(probes, 0.0, &vec![[0.0; 3]; rows.movements.len()]);
+        let residuals = rows.residuals_mm(
+            probes,
+            &Dynamics::default(),
+            &vec![[0.0; 3]; rows.movements.len()],
+        );
         let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
         let white = |pieces: &[Range<usize>]| {
             let threes = |k: usize| {
@@ -74,6 +88,11 @@ impl Means {
             first,
             white_mm,
             resets_mm: stage.resets_mm(),
+            acceleration: if shows_acceleration {
+                PER_ACCELERATION
+            } else {
+                HELD
+            },
         }
     }
 

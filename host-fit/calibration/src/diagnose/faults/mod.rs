@@ -32,7 +32,6 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::gauss_newton::Factor;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
-use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::service::Service;
 use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
 use means::Means;
@@ -80,6 +79,8 @@ pub struct Calibrated<'a> {
     pub is_for_service: bool,
     /// Whether the parameters are fitted to the rows that are judged.
     pub is_fitted: bool,
+    /// Whether the fit determined what acceleration adds to the readings.
+    pub shows_acceleration: bool,
 }
 
 /// The faults in the rows of a log that the tests of the signals leave; `is_bent` if the fit had other rows, too.
@@ -96,7 +97,7 @@ pub fn find_faults(
         stage,
         calibrated,
         is_bent,
-        means: Means::new(dataset, stage, &probes(&start)),
+        means: Means::new(dataset, stage, &start, calibrated.shows_acceleration),
         lags_s: [0.0; 3],
     };
     let mut rounds = 0..ROUNDS;
@@ -112,7 +113,7 @@ pub fn find_faults(
         // A lag is not linear.
         let later = with_beams_later(dataset, finder.lags_s, 0.5 * stage.y_baseline_m);
         start = first.parameters;
-        finder.means = Means::new(&later, stage, &probes(&start));
+        finder.means = Means::new(&later, stage, &start, calibrated.shows_acceleration);
         finder.dataset = Cow::Owned(later);
     };
     finder.faults(&first.faultless(&finder.means)?)

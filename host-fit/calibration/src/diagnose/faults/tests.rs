@@ -18,7 +18,6 @@ use hallstage_simulate::random::{Purpose, Stream};
 use hallstage_simulate::recording::{Recording, Sample, record};
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::parameters::FieldParameters;
-use hallstage_solver::estimator::probe::probes;
 
 /// Three movements of 8 s, all axes moving.
 fn recording(seed: u64) -> Recording {
@@ -130,7 +129,7 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
     });
     let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
     let parameters = fitted.estimate.parameters;
-    let means = Means::new(&dataset, &stage, &probes(&parameters));
+    let means = Means::new(&dataset, &stage, &parameters, false);
     let first = Estimate::first(&means, &parameters, &[]);
     let estimate = first
         .and_then(|first| first.faultless(&means))

@@ -2,6 +2,7 @@
 
 use super::channels::{LogSignals, median};
 use crate::diagnose::slopes::Slopes;
+use hallstage_solver::estimator::dynamics::Dynamics;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::Rows;
@@ -31,7 +32,11 @@ impl Residuals {
         let all: Vec<usize> = log.source.rows.clone().collect();
         let weights: Vec<f64> = log.usable.iter().map(|&u| f64::from(u8::from(u))).collect();
         let rows = Rows::weighted(log.dataset, &all, &weights);
-        let left_mm = rows.residuals_mm(&probes, lag_s, &vec![[0.0; 3]; rows.movements.len()]);
+        let dynamics = Dynamics {
+            lag_s,
+            ..Dynamics::default()
+        };
+        let left_mm = rows.residuals_mm(&probes, &dynamics, &vec![[0.0; 3]; rows.movements.len()]);
         let used: Vec<usize> = (0..all.len()).filter(|&row| log.usable[row]).collect();
         let centred = |values: &[f64]| {
             let mut centred = vec![0.0; values.len()];

@@ -43,6 +43,8 @@ impl Records<'_> {
                     .into(),
                     reference_mm: row.pose.map(|q| q * 1e3),
                     rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
+                    vertical_rate: [0.0; 3],
+                    acceleration_m_s2: [0.0; 6],
                     weight: 1.0,
                 })
             }));

@@ -1,0 +1,118 @@
+//! A run that shows lags and accelerations, then fast moves: what is forecast, and what the correction leaves.
+
+use crate::diagnose::{Diagnosis, diagnose_log};
+use crate::fit::{Fit, FitSettings, ModelChoice, fit};
+use crate::judge::verdict::Verdict;
+use crate::judge::{Decoded, Zeros};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::Code;
+use hallstage_input::shipped::stage;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::dynamics::Dynamics;
+use hallstage_simulate::pose::StagePose;
+use hallstage_simulate::protocol::{Protocol, Run};
+use hallstage_simulate::recording::record_stage;
+use hallstage_solver::estimator::rows::planar_motion;
+use std::f64::consts::TAU;
+
+const SEED: u64 = 7;
+
+/// Two sines an axis, smooth at both ends: amplitudes in um and urad, cycles in 30 s.
+fn two_tones(period_s: f64) -> Run {
+    const SLOW: [(f64, f64); 6] = [
+        (460e-6, 5.0),
+        (760e-6, 8.0),
+        (380e-6, 6.0),
+        (210e-6, 7.0),
+        (380e-6, 4.0),
+        (380e-6, 3.0),
+    ];
+    const FAST: [(f64, f64); 6] = [
+        (40e-6, 219.0),
+        (40e-6, 243.0),
+        (120e-6, 276.0),
+        (30e-6, 183.0),
+        (100e-6, 231.0),
+        (100e-6, 261.0),
+    ];
+    let seconds = 30.0;
+    let pose = |row: usize| {
+        let t_s = row as f64 * period_s;
+        let x = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
+        let taper = x * x * x * (10.0 - x * (15.0 - 6.0 * x));
+        let tone = |(size, cycles): (f64, f64), phase: f64| {
+            size * libm::sin(TAU * cycles * t_s / seconds + phase)
+        };
+        let axis = |k: usize| {
+            let both = tone(SLOW[k], 1.7 * k as f64) + tone(FAST[k], 1.7 * (5 - k) as f64);
+            taper * both
+        };
+        StagePose::from_array(std::array::from_fn(axis))
+    };
+    Run::planned((0..=(seconds / period_s) as usize).map(pose).collect())
+}
+
+/// A stage with these effects, with the motion of its fast moves declared for service: fit, diagnosis and the log of
+/// these moves.
+fn calibrated(dynamics: Dynamics) -> (Stage, Fit, Diagnosis, Dataset) {
+    let mut stage = stage();
+    let period_s = stage.servo_period_s;
+    let log = |run| {
+        let recording = record_stage(&stage, run, None, dynamics, SEED).expect("clear");
+        recording.dataset(&stage).expect("a triangle")
+    };
+    let run = log(two_tones(period_s));
+    let fast = log(Protocol::Fast.run(period_s, SEED));
+    let motion = planar_motion(&fast);
+    let rms = |derivative: usize, axis: usize| {
+        let squares = motion.iter().map(|row| row[derivative][axis].powi(2));
+        (squares.sum::<f64>() / motion.len() as f64).sqrt()
+    };
+    for (axis, motion) in stage.motion.axes.iter_mut().enumerate().take(3) {
+        motion.service_speed_rms = rms(0, axis);
+        motion.service_acceleration_rms = rms(1, axis);
+    }
+    let fitted = fit(&run, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
+    let diagnosis = diagnose_log(&run, &stage, Ok(&fitted));
+    (stage, fitted, diagnosis, fast)
+}
+
+/// Errors of the fast moves, rms, as decoded and corrected.
+fn errors(stage: &Stage, fit: &Fit, fast: &Dataset) -> [[f64; 3]; 2] {
+    let decoded = Decoded::new(&fit.set, fast);
+    let correction = fit.set.motion_correction.expect("a correction");
+    [decoded.corrected(&correction, fast), decoded].map(|decoded| {
+        let errors = decoded.judge(fast, stage, Zeros::None).errors;
+        errors.axes.map(|axis| axis.rms)
+    })
+}
+
+#[test]
+fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
+    let (stage, sound, diagnosis, fast) = calibrated(Dynamics::NONE);
+    let [corrected, floor] = errors(&stage, &sound, &fast);
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+    for axis in 0..3 {
+        let cost = corrected[axis] / floor[axis];
+        assert!((0.99..1.005).contains(&cost), "{axis}: {cost}");
+    }
+    for lags_s in [[3e-4, -3e-4, 0.0], [0.0; 3]] {
+        let dynamics = Dynamics::draw(lags_s, None, Some(120.0), SEED);
+        let (stage, bent, diagnosis, fast) = calibrated(dynamics);
+        for (found_s, lag_s) in bent.estimate.motion.dynamics.probe_lag_s.iter().zip(lags_s) {
+            assert!((found_s - lag_s).abs() < 10e-6, "{found_s} {lag_s}");
+        }
+        assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
+        assert_eq!(diagnosis.findings[0].code(), Code::Motion);
+        let forecast = diagnosis.predicted.expect("figures").ratio;
+        let [corrected, decoded] = errors(&stage, &bent, &fast);
+        for axis in 0..3 {
+            let [left, ratio] = [corrected[axis], decoded[axis]].map(|rms| rms / floor[axis]);
+            assert!(
+                (forecast[axis] / ratio - 1.0).abs() < 0.1,
+                "{forecast:?} {axis} {ratio}"
+            );
+            assert!(left < 1.03, "{axis}: {left}");
+        }
+    }
+}

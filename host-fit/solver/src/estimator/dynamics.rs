@@ -1,0 +1,224 @@
+//! What motion adds to the readings of the probes, and to the errors of the pose in service.
+//!
+//! Probe i reads s_i(t) = f_i(q(t - tau_i), V(t - tau_i)) + k_i . a(t). Only differences of tau belong to the probes: a lag
+//! of all probes cannot be told from a reference that is late. An acceleration moves an arm that bends, and its
+//! current in a motor coil adds a field. A controller that knows the commanded speed v and acceleration a corrects a
+//! pose: q' = q - G k a + L v with G = J^-1 and L = J^-1 diag(tau) J, J the derivatives of the readings by the pose.
+
+use super::parameters::FieldParameters;
+use super::probe::probes;
+use super::whiten::{ACCELERATIONS, LAG, PROBE_LAGS};
+use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix, Vector3};
+use runtime::matrix::{from_rows, inverse};
+
+/// Rotations count at this arm, m: an acceleration in rad/s2 times the arm is in m/s2.
+pub const ARM_M: f64 = 0.25;
+/// From m/s2 and rad/s2 to m/s2, by axis.
+const ARMS_M: [f64; 6] = [1.0, 1.0, ARM_M, 1.0, ARM_M, ARM_M];
+/// Standard deviation of the lag of a probe behind the others before a log is seen, s.
+pub const PROBE_LAG_S: f64 = 1e-3;
+/// Standard deviation of a reading's change by acceleration before a log is seen, mm per m/s2. A motor coil 5 cm away has
+/// 7e-3, an arm with a resonance at 120 Hz 1e-3 to 4e-3.
+pub const PER_ACCELERATION: f64 = 3e-3;
+/// A log whose posterior leaves less of it, mm per m/s2, determines it.
+const DETERMINED: f64 = 1e-3;
+
+/// Lags, and changes of the readings by acceleration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dynamics {
+    /// Lag of the reference behind the mean of the probes, s.
+    pub lag_s: f64,
+    /// Lag of A, B, C behind their mean, s.
+    pub probe_lag_s: [f64; 3],
+    /// Change of the readings of A, B, C by the acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, mm
+    /// per m/s2.
+    pub mm_per_m_s2: [[f64; 6]; 3],
+}
+
+impl Dynamics {
+    /// From the values of a fit of the field model.
+    pub fn from_values(values: &[f64]) -> Self {
+        let [a, b] = [values[PROBE_LAGS], values[PROBE_LAGS + 1]];
+        Self {
+            lag_s: values[LAG],
+            probe_lag_s: [a, b, -a - b],
+            mm_per_m_s2: [0, 1, 2]
+                .map(|probe| std::array::from_fn(|axis| values[place(probe, axis)])),
+        }
+    }
+
+    /// What acceleration adds to the reading of a probe, mm.
+    #[inline(always)]
+    pub fn added_mm(&self, probe: usize, acceleration_m_s2: [f64; 6]) -> f64 {
+        let pairs = self.mm_per_m_s2[probe].iter().zip(acceleration_m_s2);
+        pairs.fold(0.0, |sum, (by, acceleration)| sum + by * acceleration)
+    }
+}
+
+/// What a log says about motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionFit {
+    /// The lags, and the changes by acceleration: zero unless the log determines them.
+    pub dynamics: Dynamics,
+    /// Covariance of the lags of A, B, C behind their mean, s2.
+    pub probe_lag_covariance: Matrix3<f64>,
+    /// Covariance of the changes of A, B, C by the acceleration of each axis, (mm per m/s2)^2.
+    pub acceleration_covariance: [Matrix3<f64>; 6],
+    /// Whether the log determines the changes by acceleration.
+    pub is_determined: bool,
+}
+
+/// How fast service moves, rms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServiceMotion {
+    /// Speed of X, Y, Rz: m/s, m/s, rad/s.
+    pub speed: [f64; 3],
+    /// Acceleration of X, Y, Rz, Z, Rx, Ry: m/s2, rad/s2.
+    pub acceleration: [f64; 6],
+}
+
+impl MotionFit {
+    /// What is known of motion before a log is seen.
+    pub fn unknown() -> Self {
+        Self {
+            dynamics: Dynamics::default(),
+            probe_lag_covariance: of_three(
+                Matrix2::new(2.0, -1.0, -1.0, 2.0) * (PROBE_LAG_S * PROBE_LAG_S / 3.0),
+            ),
+            acceleration_covariance: [Matrix3::identity() * (PER_ACCELERATION * PER_ACCELERATION);
+                6],
+            is_determined: false,
+        }
+    }
+
+    /// The lags of A and B behind the mean of the probes, s, with their covariance.
+    pub(super) fn with_probe_lags([a, b]: [f64; 2], covariance: Matrix2<f64>) -> Self {
+        Self {
+            dynamics: Dynamics {
+                probe_lag_s: [a, b, -a - b],
+                ..Dynamics::default()
+            },
+            probe_lag_covariance: of_three(covariance),
+            ..Self::unknown()
+        }
+    }
+
+    /// From the values and the covariance of a fit of the field model.
+    pub(super) fn new(values: &[f64], covariance: &DMatrix<f64>, is_determined: bool) -> Self {
+        let lags = covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS);
+        let of_axis =
+            |axis: usize| Matrix3::from_fn(|i, k| covariance[(place(i, axis), place(k, axis))]);
+        Self {
+            dynamics: Dynamics::from_values(values),
+            probe_lag_covariance: of_three(lags.into()),
+            acceleration_covariance: match is_determined {
+                true => std::array::from_fn(of_axis),
+                false => Self::unknown().acceleration_covariance,
+            },
+            is_determined,
+        }
+    }
+
+    /// Whether this covariance of a fit determines the changes by the acceleration of X, Y, Rz.
+    pub(super) fn determines(covariance: &DMatrix<f64>) -> bool {
+        let places = (0..3).flat_map(|probe| [0, 1, 2].map(|axis| place(probe, axis)));
+        let mut variances = places.map(|k| covariance[(k, k)]);
+        variances.all(|variance| variance < DETERMINED * DETERMINED)
+    }
+
+    /// Standard errors of the lags of A, B, C behind their mean, s.
+    pub fn probe_lag_errors_s(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| self.probe_lag_covariance[(k, k)].sqrt())
+    }
+
+    /// Standard errors of [`Dynamics::mm_per_m_s2`].
+    pub fn acceleration_errors(&self) -> [[f64; 6]; 3] {
+        [0, 1, 2].map(|probe| {
+            let variance = |axis: usize| self.acceleration_covariance[axis][(probe, probe)];
+            std::array::from_fn(|axis| variance(axis).sqrt())
+        })
+    }
+
+    /// The same with probes that are read at one time.
+    #[must_use]
+    pub fn without_probe_lags(mut self) -> Self {
+        self.dynamics.probe_lag_s = [0.0; 3];
+        self.probe_lag_covariance = Matrix3::zeros();
+        self
+    }
+
+    /// The same with what it does not determine of acceleration taken as zero.
+    #[must_use]
+    pub fn without_prior(mut self) -> Self {
+        if !self.is_determined {
+            self.acceleration_covariance = [Matrix3::zeros(); 6];
+        }
+        self
+    }
+
+    /// The matrices of the correction, X, Y, Rz in m, m, rad: -G k by the acceleration of X, Y, Rz (s2) and L by their
+    /// speed (s). `None` where the probes do not determine the pose.
+    pub fn correction(&self, parameters: &FieldParameters) -> Option<[Matrix3<f64>; 2]> {
+        let (readings, poses) = jacobian(parameters)?;
+        let k =
+            Matrix3::from_fn(|probe, axis| self.dynamics.mm_per_m_s2[probe][axis] * ARMS_M[axis]);
+        let lags = Matrix3::from_diagonal(&self.dynamics.probe_lag_s.into());
+        // Readings are in mm, rotations in mrad.
+        Some([poses * k * -1e-3, poses * lags * readings])
+    }
+
+    /// Variances that motion adds to X, Y, Rz in service (m2, m2, rad2): speeds and accelerations of the axes are
+    /// independent. The correction leaves the errors of the fit, and what the acceleration of Z, Rx, Ry adds. `None` where
+    /// the probes do not determine the pose.
+    pub fn variance(
+        &self,
+        parameters: &FieldParameters,
+        motion: &ServiceMotion,
+        is_corrected: bool,
+    ) -> Option<[f64; 3]> {
+        let (readings, poses) = jacobian(parameters)?;
+        let mut sum = Matrix3::zeros();
+        for (axis, acceleration) in motion.acceleration.into_iter().enumerate() {
+            let known = self.dynamics.mm_per_m_s2.map(|by| by[axis]);
+            let known = if is_corrected && axis < 3 {
+                [0.0; 3]
+            } else {
+                known
+            };
+            let known = Vector3::from(known);
+            let k = self.acceleration_covariance[axis] + known * known.transpose();
+            sum += poses * k * poses.transpose() * (1e-3 * ARMS_M[axis] * acceleration).powi(2);
+        }
+        let known = if is_corrected {
+            [0.0; 3]
+        } else {
+            self.dynamics.probe_lag_s
+        };
+        let known = Vector3::from(known);
+        let lags = self.probe_lag_covariance + known * known.transpose();
+        for (axis, speed) in motion.speed.into_iter().enumerate() {
+            // J^-1 diag(J v): what a lag of each probe does to the pose.
+            let by_lag = poses * Matrix3::from_diagonal(&readings.column(axis).into_owned());
+            sum += by_lag * lags * by_lag.transpose() * (speed * speed);
+        }
+        Some([0, 1, 2].map(|axis| sum[(axis, axis)]))
+    }
+}
+
+/// The unknown of a fit for a probe and the acceleration of an axis.
+const fn place(probe: usize, axis: usize) -> usize {
+    ACCELERATIONS + 6 * probe + axis
+}
+
+/// The covariance of the lags of A, B, C, from that of A and B: their sum is zero.
+fn of_three(two: Matrix2<f64>) -> Matrix3<f64> {
+    let by_two = SMatrix::<f64, 3, 2>::new(1.0, 0.0, 0.0, 1.0, -1.0, -1.0);
+    by_two * two * by_two.transpose()
+}
+
+/// The readings by the pose at rest, and the pose by the readings.
+fn jacobian(parameters: &FieldParameters) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    let probes = probes(parameters);
+    let readings = from_rows(&probes.map(|probe| probe.read([0.0; 3], [0.0; 3]).by_pose));
+    Some((readings, inverse(&readings)?))
+}

@@ -1,0 +1,39 @@
+//! What a log shows of the probes in motion.
+
+use super::figure::{Figure, Group, figure, group};
+use hallstage_calibration::fit::Fit;
+use hallstage_calibration::judge::in_motion::InMotion;
+use serde_json::{Value, json};
+
+/// The motion up to which errors are good: rms, all axes at once, rotations at 0.25 m.
+pub(super) fn valid_up_to(motion: InMotion) -> Value {
+    json!({
+        "acceleration_m_s2": motion.acceleration_m_s2,
+        "speed_mm_s": motion.speed_m_s * 1e3,
+    })
+}
+
+/// What the log shows of the probes in motion.
+pub(super) fn probe_motion(fit: &Fit) -> Group {
+    let motion = &fit.estimate.motion;
+    let lags = motion
+        .dynamics
+        .probe_lag_s
+        .into_iter()
+        .zip(motion.probe_lag_errors_s());
+    let lags = lags.map(|(value, error)| figure(value * 1e6, "us").with_error(Some(error * 1e6)));
+    let added = motion.dynamics.mm_per_m_s2.as_flattened().iter();
+    let errors = motion.acceleration_errors();
+    let added = added.zip(errors.as_flattened());
+    let added =
+        added.map(|(value, error)| figure(value * 1e3, "um/(m/s2)").with_error(Some(error * 1e3)));
+    let correction = motion.correction(&fit.estimate.parameters);
+    let rows = |m: &nalgebra::Matrix3<f64>| json!(runtime::matrix::to_rows(m));
+    let correction =
+        correction.map(|[a, l]| json!({ "acceleration_s2": rows(&a), "velocity_s": rows(&l) }));
+    group! {
+        "lag" => Figure::List(lags.collect()),
+        "by_acceleration" => motion.is_determined.then(|| Figure::List(added.collect())),
+        "correction" => json!(correction),
+    }
+}
