@@ -241,9 +241,7 @@ impl Decoder {
 /// A blob, and what stands beside it.
 pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<StoredPosterior>)> {
     let set = blob_file::read(path).map_err(|error| blob_error(&error))?;
-    let beside = posterior_file::beside(path).filter(|path| path.exists());
-    let known = beside.map(|beside| posterior_file::read(&beside, &set, path));
-    let known = known.transpose().map_err(|error| posterior_error(&error))?;
+    let known = posterior_file::read(&set, path).map_err(|error| posterior_error(&error))?;
     Ok((set, known))
 }
 

@@ -108,7 +108,6 @@ pub fn blob_error(error: &BlobFileError) -> PyErr {
 pub fn posterior_error(error: &PosteriorFileError) -> PyErr {
     match error {
         PosteriorFileError::Read(source) => source_error(&source.problem, error.to_string()),
-        PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }

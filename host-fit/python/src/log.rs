@@ -5,6 +5,7 @@ use crate::error::{arrays_error, log_error, wrong};
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibration::words;
+use host_fit::input::axis::counted;
 use host_fit::input::dataset::Row;
 use host_fit::input::log::layout::LogLayout;
 use host_fit::input::log::{
@@ -237,7 +238,8 @@ impl Log {
             held if held < rows => format!(", {held} of them held"),
             _ => String::new(),
         };
-        format!("<Log {names}: {rows} rows in {movements} movements{held}>")
+        let movements = counted(movements, "movement");
+        format!("<Log {names}: {rows} rows in {movements}{held}>")
     }
 }
 

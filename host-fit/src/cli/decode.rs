@@ -92,10 +92,10 @@ fn posterior(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<Posterior
             Model::from_kind(set.model).name
         ))
     })?;
-    let path = posterior_file::beside(blob).ok_or_else(|| PosteriorFileError::Missing {
-        path: blob.to_owned(),
+    let known = posterior_file::read(set, blob)?;
+    let known = known.ok_or_else(|| PosteriorFileError::Missing {
+        blob: blob.to_owned(),
     })?;
-    let known = posterior_file::read(&path, set, blob)?;
     Ok(Posterior::from_covariance(
         known.covariance,
         &parameters,

@@ -11,7 +11,7 @@ use crate::report::text::as_text;
 use clap::Args;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::terms::names;
-use runtime::{ModelKind, ParameterSet};
+use runtime::ParameterSet;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -82,13 +82,9 @@ fn blob(path: &Path, set: &ParameterSet) -> Group {
 
 /// The standard errors in the posterior beside a blob; none where there is no such file.
 fn standard_errors(set: &ParameterSet, blob: &Path) -> Result<BTreeMap<String, f64>, HostError> {
-    let Some(path) = posterior_file::beside(blob).filter(|path| path.exists()) else {
+    let Some(known) = posterior_file::read(set, blob)? else {
         return Ok(BTreeMap::new());
     };
-    if set.model != ModelKind::Field {
-        return Ok(BTreeMap::new());
-    }
-    let known = posterior_file::read(&path, set, blob)?;
     let errors = known.covariance.diagonal().map(f64::sqrt);
     Ok(names(errors.len())
         .into_iter()

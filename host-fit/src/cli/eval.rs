@@ -55,8 +55,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         limit: args.limit,
     };
     // What is known of k and h stands beside the blob.
-    let known = posterior_file::beside(&args.params);
-    let known = known.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
+    let known = posterior_file::read(&set, &args.params).ok().flatten();
     let blob = (&set, known.as_ref());
     let evaluation = terminal::timed("evaluation", || {
         Evaluation::new(blob, &stage, order, paths.len(), |take| {

@@ -33,8 +33,7 @@ pub(super) struct InspectArgs {
 pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], None, [args.params.as_path()])?;
     let set = blob_file::read(&args.params)?;
-    let posterior = posterior_file::beside(&args.params);
-    let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
+    let known = posterior_file::read(&set, &args.params).ok().flatten();
     let errors = known
         .as_ref()
         .and_then(|known| temperature_errors(&known.covariance));

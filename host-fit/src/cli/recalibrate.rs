@@ -5,16 +5,15 @@ use super::arguments::choice;
 use super::report::finish;
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;
-use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
 use clap::Args;
-use hallstage_calibration::recalibrate::{RecalibrateError, StoredPosterior};
+use hallstage_calibration::recalibrate::RecalibrateError;
 use hallstage_input::log::ReadOptions;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::update::Change;
+use runtime::ModelKind;
 use runtime::parameters::Text;
-use runtime::{ModelKind, ParameterSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `recalibrate`.
 #[derive(Debug, Args)]
@@ -55,10 +54,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         let model = Model::from_kind(old.model).title();
         return Err(RecalibrateError::OtherModel { model }.into());
     }
-    let known = match &old_posterior {
-        Some(path) => read_known(path, &old, args)?,
-        None => None,
-    };
+    let known = posterior_file::read(&old, &args.params)?;
     let options = ReadOptions {
         rows_max: ReadOptions::FIT.rows_max,
         ..ReadOptions::default()
@@ -78,21 +74,4 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     updated
         .refusal_message()
         .map_or(Ok(()), |why| Err(HostError::rejected(why)))
-}
-
-/// What is known beside the old blob; gains can be found without it.
-fn read_known(
-    path: &Path,
-    old: &ParameterSet,
-    args: &RecalibrateArgs,
-) -> Result<Option<StoredPosterior>, HostError> {
-    match posterior_file::read(path, old, &args.params) {
-        Ok(known) => Ok(Some(known)),
-        Err(PosteriorFileError::Missing { .. })
-            if matches!(args.what, Change::Gain | Change::Gains) =>
-        {
-            Ok(None)
-        }
-        Err(error) => Err(error.into()),
-    }
 }

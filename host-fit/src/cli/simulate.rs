@@ -7,6 +7,7 @@ use crate::cli::terminal;
 use crate::output::Outputs;
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
+use hallstage_input::axis::counted;
 use hallstage_simulate::assembly::Magnets;
 use hallstage_simulate::dynamics::Dynamics;
 use hallstage_simulate::log_text::{log_csv, truth_csv};
@@ -110,10 +111,10 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         Magnets::Imperfect => "imperfect magnets",
     };
     terminal::print(&format!(
-        "wrote {}: {} rows in {} movements of stage {}, {magnets}\n",
+        "wrote {}: {} rows in {} of stage {}, {magnets}\n",
         args.out.display(),
         recording.rows(),
-        recording.movements.len(),
+        counted(recording.movements.len(), "movement"),
         args.seed
     ))
 }

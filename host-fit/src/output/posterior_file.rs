@@ -6,7 +6,7 @@
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
 use hallstage_calibration::recalibrate::StoredPosterior;
-use hallstage_input::source::{SourceError, SourceProblem, read_whole};
+use hallstage_input::source::{SourceError, read_whole};
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
@@ -43,12 +43,12 @@ struct Content {
 pub enum PosteriorFileError {
     /// The file is not there.
     #[error(
-        "{} does not exist: `host-fit fit` writes it beside a blob of the field model. Copy it there, fit again, or \
-         recalibrate gains only (--what gains)", path.display()
+        "{}.posterior does not exist: `host-fit fit` writes it beside a blob of the field model. Copy it there, fit again, or \
+         recalibrate gains only (--what gains)", blob.display()
     )]
     Missing {
-        /// The file.
-        path: PathBuf,
+        /// The blob.
+        blob: PathBuf,
     },
     /// The file cannot be read.
     #[error(transparent)]
@@ -106,21 +106,19 @@ pub fn add_calibration(
     outputs.add(path, &blob)
 }
 
-/// Reads what is known beside the blob `set`, which was read from `blob`.
+/// Reads what is known of the blob `set`, which was read from `blob`; `None` where no posterior stands beside it.
 ///
 /// # Errors
-/// See [`PosteriorFileError`].
+/// See [`PosteriorFileError`], without `Missing`.
 pub fn read(
-    path: &Path,
     set: &ParameterSet,
     blob: &Path,
-) -> Result<StoredPosterior, PosteriorFileError> {
-    let bytes = match read_whole(path, BYTES_MAX) {
-        Err(error) if matches!(error.problem, SourceProblem::NotFound) => {
-            return Err(PosteriorFileError::Missing { path: error.path });
-        }
-        read => read?,
+) -> Result<Option<StoredPosterior>, PosteriorFileError> {
+    let Some(path) = beside(blob).filter(|path| path.exists()) else {
+        return Ok(None);
     };
+    let path = path.as_path();
+    let bytes = read_whole(path, BYTES_MAX)?;
     let unusable = |problem| PosteriorFileError::Unusable {
         path: path.to_owned(),
         problem,
@@ -133,7 +131,7 @@ pub fn read(
             blob: blob.to_owned(),
         });
     }
-    Ok(known)
+    Ok(Some(known))
 }
 
 fn blob_hash(set: &ParameterSet) -> Result<[u8; 32], runtime::BlobError> {
@@ -262,8 +260,7 @@ mod tests {
             let mut outputs = Outputs::default();
             add_calibration(&mut outputs, &path, &set, known).expect("added");
             outputs.commit().expect("written");
-            let beside = beside(&path).expect("a file");
-            assert_eq!(read(&beside, &set, &path).ok().as_ref(), known);
+            assert_eq!(read(&set, &path).expect("sound").as_ref(), known);
         }
     }
 

@@ -12,7 +12,7 @@ use super::text::file_name;
 use super::verdict::{Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::white_noise;
-use hallstage_input::axis::{AXES, Axis, sign};
+use hallstage_input::axis::{AXES, Axis, counted, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -125,14 +125,9 @@ impl Source<'_> {
         let (rows, movements) = self.dataset.read();
         let logs = self.dataset.logs.iter().map(|log| file_name(&log.path));
         let logs: Vec<String> = logs.collect();
-        let movements = match movements {
-            1 => "one movement".to_owned(),
-            several => format!("{several} movements"),
-        };
-        add(
-            "log",
-            format!("{}: {rows} rows in {movements}", logs.join(", ")),
-        );
+        let movements = counted(movements, "movement");
+        let what = format!("{}: {rows} rows in {movements}", logs.join(", "));
+        add("log", what);
         facts
     }
 

@@ -2,6 +2,7 @@
 
 use super::table::Table;
 use super::text::file_name;
+use hallstage_input::axis::counted;
 use hallstage_input::dataset::Dataset;
 use sha2::{Digest, Sha256};
 use std::ffi::{OsStr, OsString};
@@ -51,14 +52,11 @@ impl Provenance {
     pub fn add_logs(&mut self, dataset: &Dataset) {
         let hash = hex(&dataset.sha256);
         for (k, log) in dataset.logs.iter().enumerate() {
-            let movements = match log.movements_read {
-                1 => "one movement".to_owned(),
-                several => format!("{several} movements"),
-            };
+            let movements = counted(log.movements_read, "movement");
             let (rows, drawn) = (log.rows_read, log.rows.len());
             let runs = dataset.movements.iter().filter(|m| m.log == k).count();
             let drawn = match drawn < rows {
-                true => format!("; {drawn} of them, in {runs} runs, are drawn"),
+                true => format!("; {drawn} of them, in {}, are drawn", counted(runs, "run")),
                 false => String::new(),
             };
             let hash = if dataset.logs.len() == 1 {
@@ -139,8 +137,10 @@ mod tests {
         let mut provenance = Provenance::default();
         provenance.add_logs(&sample);
         let (rows, runs) = (sample.rows.len(), sample.movements.len());
-        let want =
-            format!("log, 57000 rows in 57 movements; {rows} of them, in {runs} runs, are drawn");
+        let want = format!(
+            "log, 57000 rows in 57 movements; {rows} of them, in {}, are drawn",
+            counted(runs, "run")
+        );
         assert!(provenance.0.cells().rows[0][1].starts_with(&want));
     }
 }
