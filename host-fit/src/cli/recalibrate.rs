@@ -5,6 +5,7 @@ use super::arguments::choice;
 use super::report::finish;
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;
+use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
 use clap::Args;
 use hallstage_calibration::recalibrate::RecalibrateError;
@@ -55,6 +56,10 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         return Err(RecalibrateError::OtherModel { model }.into());
     }
     let known = posterior_file::read(&old, &args.params)?;
+    if known.is_none() && matches!(args.what, Change::All | Change::Temperature) {
+        let blob = args.params.clone();
+        return Err(PosteriorFileError::Missing { blob }.into());
+    }
     let options = ReadOptions {
         rows_max: ReadOptions::FIT.rows_max,
         ..ReadOptions::default()
