@@ -1,6 +1,6 @@
 //! Bad input: an exit status, a message that says where and what to do, and nothing written.
 
-use crate::common::{Bench, changed, log, rows, thinned_log, with_cell};
+use crate::common::{Bench, changed, column, log, rows, thinned_log, with_cell};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use host_fit::input::shipped::STAGE_TOML;
@@ -150,4 +150,42 @@ fn wrong_usage_ends_with_status_2() {
         assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments}");
     }
     assert!(bench.holds_only(&["log.csv"]));
+}
+
+/// The blob describes these rows, but so would any other.
+#[test]
+fn a_log_where_nothing_moves_judges_no_blob_and_the_verdict_is_the_word_that_is_shown() {
+    let bench = Bench::with_log();
+    bench.good("fit log.csv --out p.bin");
+    let log = bench.text("log.csv");
+    let first: Vec<i64> = (log.lines().nth(1).expect("a row").split(','))
+        .map(|cell| cell.parse().expect("whole"))
+        .collect();
+    let time = column(&log, "t_us");
+    bench.write(
+        "still.csv",
+        changed(&log, |_, cells| {
+            let t_us = cells[time];
+            let movement = cells[0];
+            cells.copy_from_slice(&first);
+            (cells[0], cells[time]) = (movement, t_us);
+        }),
+    );
+    let eval = "eval p.bin still.csv --json eval.json";
+    bench.bad(eval, 4, &["Nothing moves", "Leave it out"]);
+    assert_eq!(bench.json("eval.json")["verdict"], "refused");
+}
+
+#[test]
+fn check_reads_a_stage_file_alone() {
+    let bench = Bench::new();
+    bench.good("check --stage stage.toml");
+    bench.write("other.toml", "[hall]\n");
+    bench.bad(
+        "check --stage other.toml",
+        3,
+        &["other.toml:1:1: `hall.h1x_m`"],
+    );
+    bench.bad("check", 2, &["LOG"]);
+    bench.bad("check --stage stage.toml --json -", 2, &["LOG"]);
 }

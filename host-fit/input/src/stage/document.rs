@@ -60,7 +60,11 @@ impl<'t> Document<'t> {
             let place = position(path, text, error.span().map_or(0, |span| span.start));
             let line = text.lines().nth(place.line - 1).unwrap_or_default();
             let value = line.split_once('=').map_or("", |(_, value)| value);
-            let message = decimal_comma(value).unwrap_or_else(|| error.message().to_owned());
+            let message = match has_decimal_comma(value) {
+                true => "a decimal comma; write a decimal point, as 0.1975",
+                false => error.message(),
+            };
+            let message = message.to_owned();
             StageError::Syntax { place, message }
         });
         let document = Self {
@@ -258,18 +262,11 @@ fn is_like(one: &str, other: &str) -> bool {
     3 * strsim::damerau_levenshtein(one, other) <= letters
 }
 
-/// What to say of a number with a decimal comma, if there is one.
-fn decimal_comma(text: &str) -> Option<String> {
-    let is_digit = |c: char| c.is_ascii_digit();
-    text.match_indices(',').find_map(|(at, _)| {
-        let (before, after) = (text.get(..at)?, text.get(at + 1..)?);
-        let whole = before.get(before.trim_end_matches(is_digit).len()..)?;
-        let decimals = after.get(..after.len() - after.trim_start_matches(is_digit).len())?;
-        let is_number = !whole.is_empty() && !decimals.is_empty();
-        is_number.then(|| {
-            format!("a decimal comma; write a decimal point ({whole}.{decimals}, not {whole},{decimals})")
-        })
-    })
+/// Whether a value begins like a number with a decimal comma.
+fn has_decimal_comma(value: &str) -> bool {
+    let digit = |c: char| c.is_ascii_digit();
+    let comma = value.split_once(',');
+    comma.is_some_and(|(whole, decimals)| whole.ends_with(digit) && decimals.starts_with(digit))
 }
 
 /// Line and column of a byte offset.

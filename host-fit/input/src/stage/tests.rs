@@ -306,7 +306,7 @@ fn what_is_wrong_with_a_column_is_named() {
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_its_place() {
-    let comma = "write a decimal point (0.1975, not 0,1975)";
+    let comma = "write a decimal point, as 0.1975";
     for (old, new, at, part) in [
         ("h1x_m = 0.1975\n", "h1x_m = 0.1975 m\n", 3, "not TOML"),
         ("h1y_m = 0.40", "h1x_m = 0.40", 4, "not TOML"),
