@@ -132,7 +132,7 @@ fn errors_of_a_fit_that_cannot_be_are_unknown() {
     set.fit.rms = [3e38, -1e-6, 1e-6];
     blob_file::write(&bench.path("p.bin"), &set).expect("written");
     let shown = stdout(&bench.good("inspect p.bin --json p.json"));
-    let rz = shown.lines().find(|line| line.starts_with("  rz "));
+    let rz = shown.lines().find(|line| line.starts_with("  Rz "));
     assert!(rz.is_some_and(|line| line.contains(" 1.000 ")), "{shown}");
     let errors = &bench.json("p.json")["fit"]["errors"];
     assert!(errors["x"]["rmse_um"].is_null() && errors["y"]["rmse_um"].is_null());
