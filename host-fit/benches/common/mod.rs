@@ -30,6 +30,7 @@ pub const RUN_8: PlannedRun = run(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]);
 
 const fn run(seconds: f64, cycles: [f64; 6]) -> PlannedRun {
     PlannedRun {
+        tones: [0.0; 6],
         seconds,
         taper_s: 0.5,
         amplitudes: [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6],

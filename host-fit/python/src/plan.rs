@@ -72,7 +72,7 @@ impl Plan {
     }
 }
 
-/// Plans the run to make for the field model: all six axes at once, a sine each, within the limits that
+/// Plans the run to make for the field model: all six axes at once, a slow and a fast sine each, within the limits that
 /// `[motion]` of the stage gives.
 ///
 /// `seconds`: its length, s, above 0 and up to 600; 20 are plenty for a stage of the usual limits.

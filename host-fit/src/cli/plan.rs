@@ -5,7 +5,7 @@ use super::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::report::plan::{figures, steps, tables};
+use crate::report::plan::{figures, steps, tables, untold};
 use crate::report::text::as_text;
 use clap::Args;
 use hallstage_calibration::plan::temperature::{COLD_S, protocol};
@@ -64,6 +64,6 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     args.json.add(&mut outputs, &figures)?;
     let written = outputs.commit()?;
     terminal::print(&as_text(&tables(&plan, &protocol, &stage)))?;
-    terminal::print(&steps(&protocol))?;
+    terminal::print(&(untold(&plan, &stage) + &steps(&protocol)))?;
     super::wrote(written)
 }

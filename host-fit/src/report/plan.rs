@@ -5,12 +5,16 @@ use super::figure::{Figure, Group, bare, figure, group, micro};
 use super::parameters::probe_table;
 use super::table::Table;
 use hallstage_calibration::plan::Plan;
+use hallstage_calibration::plan::forecast::acceleration_error;
+use hallstage_calibration::plan::run::TONES_HZ;
 use hallstage_calibration::plan::temperature::WarmLog;
 use hallstage_input::axis::{AXES, PLANAR};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
+/// Standard error that leaves the change of a signal by acceleration unknown, m per m/s2: such a fit does without it.
+const ACCELERATION_ERROR_MAX: f64 = 1e-6;
 /// Number of the least determined parameters that are named.
 const NAMED: usize = 5;
 
@@ -31,6 +35,8 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
             "amplitude": run.amplitudes[k],
             "service": motion.service,
             "frequency_hz": run.frequency_hz(k),
+            "tone": run.tones[k],
+            "tone_frequency_hz": TONES_HZ[k],
             "peak_speed": peak_speed,
             "speed_limit": motion.speed,
             "peak_acceleration": peak_acceleration,
@@ -63,10 +69,34 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
         "rows" => run.rows(stage.servo_period_s),
         "axes" => json!((0..6).map(axis).collect::<Vec<_>>()),
         "service" => per_axis(predicted),
+        "acceleration" => per_axis(|k| per_acceleration(plan, k, stage)),
         "parameters" => Value::from((0..COUNT).map(parameter).collect::<Map<_, _>>()),
         "least_determined" => worst,
         "temperature" => protocol.iter().map(warm_log).collect::<Vec<_>>(),
     }
+}
+
+/// Standard error of the change of a probe's signal by the acceleration of X, Y or Rz.
+fn per_acceleration(plan: &Plan, k: usize, stage: &Stage) -> Group {
+    let error = acceleration_error(&plan.run, k, stage.servo_period_s);
+    group! { "standard_error" => bare(rounded(error * 1e6, 2), "um/(m/s2)") }
+}
+
+/// What the run cannot tell, if there is something: errors that follow an acceleration.
+pub fn untold(plan: &Plan, stage: &Stage) -> String {
+    let is_unknown = |k: &usize| {
+        let error = acceleration_error(&plan.run, *k, stage.servo_period_s);
+        error > ACCELERATION_ERROR_MAX
+    };
+    let axes: Vec<&str> = (0..3).filter(is_unknown).map(|k| AXES[k].key).collect();
+    if axes.is_empty() {
+        return String::new();
+    }
+    format!(
+        "the run cannot tell errors that follow the acceleration of {}: the limits in [motion] of stage.toml leave its \
+         fast tone too small\n",
+        axes.join(", ")
+    )
 }
 
 /// A log at a temperature, and what is expected of a fit to all logs up to it: the standard errors of k and h, and the
@@ -119,6 +149,8 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
                 "amplitude",
                 "in service",
                 "frequency, Hz",
+                "fast tone",
+                "frequency, Hz",
                 "speed, per s",
                 "limit",
                 "acceleration, per s2",
@@ -133,6 +165,8 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
             micro(run.amplitudes[k]),
             micro(limits.service),
             run.frequency_hz(k).into(),
+            micro(run.tones[k]),
+            TONES_HZ[k].into(),
             micro(peaks[0]),
             micro(limits.speed),
             micro(peaks[1]),

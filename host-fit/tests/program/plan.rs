@@ -1,7 +1,29 @@
 //! What `plan` refuses. The package's tests compare its run with the program's.
 
-use crate::common::Bench;
+use crate::common::{Bench, number, stdout};
 use host_fit::input::shipped::STAGE_TOML;
+
+#[test]
+fn a_stage_that_cannot_follow_the_fast_tone_is_told_what_its_run_lacks() {
+    let bench = Bench::new();
+    let says = "cannot tell errors that follow the acceleration of x:";
+    let planned = |stage: &str| {
+        let command = format!("plan --stage {stage} --seconds 8 --json plan.json");
+        let shown = stdout(&bench.good(&command));
+        let error = bench.json("plan.json")["acceleration"]["x"]["standard_error"].clone();
+        (shown.contains(says), number(&error))
+    };
+    let limited = "\nx = { acceleration_m_per_s2 = 0.01, service_m = 500e-6";
+    bench.write("usual.toml", STAGE_TOML);
+    bench.write(
+        "stiff.toml",
+        STAGE_TOML.replace("\nx = { service_m = 500e-6", limited),
+    );
+    let (is_told, error) = planned("usual.toml");
+    assert!(!is_told && error < 0.1, "{error}");
+    let (is_told, error) = planned("stiff.toml");
+    assert!(is_told && error > 1.0, "{error}");
+}
 
 #[test]
 fn what_cannot_be_planned_leaves_no_file() {

@@ -1,15 +1,16 @@
 //! The forecast of a fit to a run, before anything is measured.
 
-use super::run::PlannedRun;
+use super::run::{PlannedRun, TONES_HZ};
 use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
-use hallstage_solver::estimator::dynamics::ARM_M;
+use hallstage_solver::estimator::dynamics::ARMS_M;
 use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::{FALL_PER_M, FieldParameters};
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use hallstage_solver::estimator::whiten::Noise;
 use runtime::model::Sensitivity;
+use std::f64::consts::TAU;
 
 /// The stage before its calibration: probes at their designed places over the centre lines of the
 /// magnets, with sensitivities in the middle of the search range.
@@ -55,6 +56,15 @@ pub fn forecast(
     forecaster.forecast(&rows(&[(run, [0.0; 2])], step_s), step_s / period_s)
 }
 
+/// Standard error of the change of a probe's signal by the acceleration of an axis, as the fast tone of a run
+/// determines it, m per m/s2, rotations at 0.25 m: sigma sqrt(2 / N) / (B w^2), with the noise sigma of N rows and
+/// the rate w of the tone. Infinite without a tone.
+pub fn acceleration_error(run: &PlannedRun, axis: usize, period_s: f64) -> f64 {
+    let rate = TAU * TONES_HZ[axis];
+    let acceleration = ARMS_M[axis] * run.tones[axis] * rate * rate;
+    SensorErrors::USUAL.hall_m * (2.0 / run.rows(period_s) as f64).sqrt() / acceleration
+}
+
 /// Rows of runs, sampled every `step_s`. Each run is a movement at a distance (mount, body) from T0 in K.
 pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
     let (mut rows, mut movements) = (Vec::new(), Vec::new());
@@ -72,14 +82,7 @@ pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
                 reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
                 rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
                 vertical_rate: [at[3][1], at[4][1], at[5][1]],
-                acceleration_m_s2: std::array::from_fn(|axis| {
-                    at[axis][2]
-                        * if [2, 4, 5].contains(&axis) {
-                            ARM_M
-                        } else {
-                            1.0
-                        }
-                }),
+                acceleration_m_s2: std::array::from_fn(|axis| at[axis][2] * ARMS_M[axis]),
             }
         };
         rows.extend((0..(run.seconds / step_s).floor() as usize).map(row));

@@ -2,7 +2,7 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | [`run`] | six sines between smooth ends |
+//! | [`run`] | a slow and a fast sine for each axis between smooth ends |
 //! | [`mod@forecast`] | the forecast of a fit to a run |
 //! | [`search`] | the choice of the frequencies |
 //! | [`temperature`] | the logs that determine the temperature coefficients |
@@ -160,7 +160,7 @@ fn remedy(stage: &Stage, run: &PlannedRun) -> String {
         .map(|((axis, _), _)| axis.key)
         .collect();
     if short.is_empty() {
-        "make the run longer, or allow higher speeds in [motion] of stage.toml".to_owned()
+        "make the run longer".to_owned()
     } else {
         let axes = short.join(", ");
         format!(

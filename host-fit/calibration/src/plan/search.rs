@@ -11,9 +11,9 @@ use hallstage_simulate::random::{Purpose, Stream};
 use hallstage_solver::estimator::forecast::Forecaster;
 use rayon::prelude::*;
 
-/// Highest frequency, Hz. Faster motion shakes the stage and gains nothing, since the reference hardly
+/// Highest frequency of the slow sines, Hz. Faster motion shakes the stage and gains nothing, since the reference hardly
 /// drifts within a second.
-const FREQUENCY_MAX_HZ: f64 = 2.0;
+const FREQUENCY_MAX_HZ: f64 = 1.0;
 /// Cycles are multiples of one half: sines half a cycle apart differ enough.
 const CYCLE_STEP: f64 = 0.5;
 /// Fewest cycles.
@@ -39,6 +39,7 @@ pub fn allowed_cycles(motion: &AxisMotion, axis: usize, seconds: f64, taper_s: f
             taper_s,
             amplitudes: [motion.amplitude; 6],
             cycles: [*cycles; 6],
+            tones: [0.0; 6],
         };
         let [speed, acceleration] = run.peaks(axis);
         speed <= motion.speed && acceleration <= motion.acceleration
@@ -55,11 +56,15 @@ pub fn best(
     taper_s: f64,
     allowed: &[Vec<f64>; 6],
 ) -> Option<PlannedRun> {
-    let run = |cycles: [f64; 6]| PlannedRun {
-        seconds,
-        taper_s,
-        amplitudes: stage.motion.axes.map(|axis| axis.amplitude),
-        cycles,
+    let run = |cycles: [f64; 6]| {
+        PlannedRun {
+            seconds,
+            taper_s,
+            amplitudes: stage.motion.axes.map(|axis| axis.amplitude),
+            cycles,
+            tones: [0.0; 6],
+        }
+        .with_tones(&stage.motion)
     };
     let step_s = STEP_S.max(stage.servo_period_s);
     // The variance due to the parameters over the variance due to noise, for the worst axis.

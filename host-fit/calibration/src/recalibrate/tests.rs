@@ -30,6 +30,7 @@ fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
     const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
     let amplitude = |k: usize| if cycles[k] > 0.0 { AMPLITUDES[k] } else { 0.0 };
     let run = PlannedRun {
+        tones: [0.0; 6],
         seconds,
         taper_s: 0.5,
         amplitudes: std::array::from_fn(amplitude),

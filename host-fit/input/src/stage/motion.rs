@@ -17,15 +17,15 @@ use crate::axis::{AXES, Axis};
 pub struct AxisMotion {
     /// Largest magnitude in service.
     pub service: f64,
-    /// Speed in service, rms; by default that of a sine over half the range of service at 0.3 to 2 Hz.
+    /// Speed in service, rms; by default of a sine over half the range of service at 0.3 to 2 Hz.
     pub service_speed_rms: f64,
-    /// Acceleration in service, rms; by default that of those sines.
+    /// Acceleration in service, rms; by default of the same sines.
     pub service_acceleration_rms: f64,
     /// Largest magnitude in a calibration run; by default equal to `service`.
     pub amplitude: f64,
-    /// Largest speed in a calibration run; by default the speed of a sine over the range of service at 1 Hz.
+    /// Largest speed in a calibration run; infinite without a limit.
     pub speed: f64,
-    /// Largest acceleration in a calibration run; by default the acceleration of a sine over half the range of service at 2 Hz.
+    /// Largest acceleration in a calibration run; infinite without a limit.
     pub acceleration: f64,
 }
 
@@ -39,15 +39,10 @@ pub struct Motion {
 /// Default range in service by axis, m or rad: the range of the given logs.
 const SERVICE: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
 
-/// Default rms speed (1/s) and rms acceleration (1/s2) over range of service: those of sines over half the
+/// Default rms speed (1/s) and rms acceleration (1/s2) over range of service, of sines over half the
 /// range, all frequencies f from 0.3 to 2 Hz equally likely, 2 pi f / sqrt(8) and (2 pi f)^2 / sqrt(8). The
 /// given logs of service have 2.73 and 26.6.
 const SERVICE_RMS: [f64; 2] = [2.8, 27.0];
-/// Default speed over range of service, 1/s: 2 pi 1 Hz. The fastest motion of the given logs,
-/// sines over half the range at up to 2 Hz, has the same.
-const SPEED: f64 = std::f64::consts::TAU;
-/// Default acceleration over range of service, 1/s2, of those sines.
-const ACCELERATION: f64 = 2.0 * SPEED * SPEED;
 /// Ranges that make sense, m or rad: beyond the larger one no small angle is small.
 const RANGES: (f64, f64) = (1e-7, 1e-2);
 /// Speeds and accelerations that make sense, SI.
@@ -61,8 +56,8 @@ impl AxisMotion {
             service_speed_rms: SERVICE_RMS[0] * service,
             service_acceleration_rms: SERVICE_RMS[1] * service,
             amplitude: service,
-            speed: SPEED * service,
-            acceleration: ACCELERATION * service,
+            speed: f64::INFINITY,
+            acceleration: f64::INFINITY,
         }
     }
 }
@@ -124,7 +119,7 @@ mod tests {
         assert_eq!(motion.axes[1..5], default.axes[1..5]);
         let x = &motion.axes[0];
         assert_eq!((x.amplitude, x.acceleration), (1e-3, 0.5));
-        assert!((x.speed - 2.0 * default.axes[0].speed).abs() < 1e-12);
+        assert_eq!(x.speed, f64::INFINITY);
         assert!((x.service_speed_rms - 2.0 * default.axes[0].service_speed_rms).abs() < 1e-12);
         let ry = &motion.axes[5];
         assert_eq!((ry.service, ry.amplitude), (480e-6, 0.0));

@@ -14,7 +14,7 @@ use runtime::matrix::{from_rows, inverse};
 /// Rotations count at this arm, m: an acceleration in rad/s2 times the arm is in m/s2.
 pub const ARM_M: f64 = 0.25;
 /// From m/s2 and rad/s2 to m/s2, by axis.
-const ARMS_M: [f64; 6] = [1.0, 1.0, ARM_M, 1.0, ARM_M, ARM_M];
+pub const ARMS_M: [f64; 6] = [1.0, 1.0, ARM_M, 1.0, ARM_M, ARM_M];
 /// Standard deviation of the lag of a probe behind the others before a log is seen, s.
 pub const PROBE_LAG_S: f64 = 1e-3;
 /// Standard deviation of a reading's change by acceleration before a log is seen, mm per m/s2. A motor coil 5 cm away has

@@ -1,6 +1,6 @@
 //! The posterior of a log that is not recorded yet: it does not depend on the residuals.
 
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, covariance_at, temperature_errors};
 use super::probe::probes;
@@ -100,6 +100,11 @@ impl Forecaster {
             resets_mm: None,
             faults: &[],
         };
-        unknowns(&places, temperature, HELD).covariance(&equations.sum_blocks(&blocks))
+        let normal = equations.sum_blocks(&blocks);
+        let with = |acceleration| unknowns(&places, temperature, acceleration).covariance(&normal);
+        match with(PER_ACCELERATION)? {
+            open if MotionFit::determines(&open) => Some(open),
+            _ => with(HELD),
+        }
     }
 }
