@@ -327,6 +327,23 @@ mod tests {
             }
         }
 
+        #[test]
+        fn the_slopes_of_p_are_those_of_its_value(
+            at in prop::array::uniform3(-1.0..1.0f64),
+            pairs in prop::array::uniform8(prop::array::uniform2(-1.0..1.0f64)),
+            plain in prop::array::uniform2(-1.0..1.0f64),
+        ) {
+            let [u_w_w, u_w, u_z_z, u_u_u, u_u, w_w, w_z, z_z] = pairs;
+            let [u_u_w, w_w_w] = plain;
+            let shape = Shape { u_w_w, u_w, u_z_z, u_u_u, u_u, w_w, w_z, z_z, u_u_w, w_w_w };
+            let ([u, w, zr], h) = (at, 1e-4);
+            let p = |u, w| shape.at(u, w, zr).value;
+            let Tangent { per_u, per_w, .. } = shape.at(u, w, zr);
+            // The central difference of a cubic errs by h^2 times its third coefficient.
+            prop_assert!((per_u - (p(u + h, w) - p(u - h, w)) / (2.0 * h)).abs() < 1e-7);
+            prop_assert!((per_w - (p(u, w + h) - p(u, w - h)) / (2.0 * h)).abs() < 1e-7);
+        }
+
         /// Terms of zero add nothing: the poses equal Model (31) at the same phi.
         #[test]
         fn without_its_terms_the_field_model_is_model_31(
