@@ -242,3 +242,10 @@ fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
 fn the_error_of_the_bus_is_kept() {
     keeps_the_error_of_the_bus(Ads131m08::new);
 }
+
+#[test]
+fn a_damaged_frame_before_the_reset_does_not_matter() {
+    let mut all = started();
+    all[0] = frame(0x0011, 0, vec![0x55; FRAME_BYTES]);
+    assert_eq!(try_start(&all), Ok(()));
+}

@@ -162,3 +162,31 @@ fn a_missing_temperature_of_a_valid_pose_is_sent_in_20_bits() {
         .find_map(|frame| receiver.take(&BusFrame::from(frame), 0).tick);
     assert_eq!(got.map(|pose| pose.status), Some(missing));
 }
+
+#[test]
+fn poses_between_two_time_frames_are_dated_by_their_numbers() {
+    let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
+    let (mut undated, mut time_frames) = (0, 0);
+    for k in 0..100u16 {
+        // The node misses three ticks before its 40th, and says so in the status.
+        let number = u32::from(k) + if k >= 40 { 3 } else { 0 };
+        let time_us = (u32::MAX - 50_000).wrapping_add(2_000 * number);
+        let mut reading = reading(k);
+        if k == 40 {
+            reading.status = Status::FRAMES_MISSED;
+        }
+        let mut pose = None;
+        for frame in sender.frames(&reading, Some(&codes(number, time_us))) {
+            time_frames += u32::from(frame.message == Message::PoseTime);
+            pose = pose.or(receiver.take(&BusFrame::from(frame), time_us).tick);
+        }
+        let pose = pose.expect("three axes came");
+        match receiver.sampled_us(&pose, 2_000) {
+            Some(dated_us) => assert_eq!(dated_us, time_us, "{k}"),
+            None => undated += 1,
+        }
+    }
+    assert_eq!(time_frames, 7);
+    // From the 40th to the 47th: the 48th comes with a time frame.
+    assert_eq!(undated, 8);
+}

@@ -208,3 +208,29 @@ fn temperatures_are_forgotten_when_none_come_or_the_node_is_silent() {
     assert!(r.1.is_stale());
     assert_eq!(temperatures(&mut r, 295..296, false), [MISSING_CODE; 2]);
 }
+
+#[test]
+fn a_delayed_frame_is_late_and_its_codes_are_not_used() {
+    let mut r = new(Layout::Bits16);
+    feed(&mut r, Layout::Bits16, 1);
+    let [hall_2, gaps_2] = pair(2);
+    let [hall_3, gaps_3] = pair(3);
+    r.take(&hall_2, 4_000);
+    assert!(r.take(&hall_3, 6_000).tick.is_some());
+    let message = Message::Capacitive;
+    let late = r.take(&gaps_2, 6_010);
+    assert_eq!(late.fault, Some(BusFault::Late { message }));
+    let taken = r.take(&gaps_3, 6_020);
+    assert_eq!((taken.tick, taken.fault), (Some(raw(3)), None));
+}
+
+#[test]
+fn frames_of_a_tick_may_come_in_any_order() {
+    let mut r = new(Layout::Bits16);
+    for sequence in 1..40 {
+        let [hall, gaps] = pair(sequence);
+        assert_eq!(r.take(&gaps, sequence * 2000), Taken::NOTHING);
+        let tick = r.take(&hall, sequence * 2000).tick;
+        assert_eq!(tick, Some(raw(sequence)));
+    }
+}

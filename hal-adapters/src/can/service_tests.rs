@@ -3,6 +3,7 @@ extern crate std;
 use super::super::frame::BusFrame;
 use super::*;
 use runtime::{AnyDecoder, OnInvalid, ParameterSet, RawFrame};
+use std::vec::Vec;
 
 const TICKS_PER_S: u32 = 500;
 
@@ -163,4 +164,37 @@ fn a_re_zero_that_is_too_short_is_refused_at_once() {
     assert_eq!(short, Outcome::TooShort);
     assert_eq!(stage.flags(), flag::REZERO_REFUSED);
     assert_eq!(stage.ask(REZERO, 3), Outcome::Started);
+}
+
+#[test]
+fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
+    let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
+    let mut outcomes = Vec::new();
+    for (token, request) in (1..).zip([
+        Request::Record { on: true },
+        Request::Identify { seconds: 1 },
+        Request::ServoOff { seconds: 1 },
+        REZERO,
+        Request::ClearZero,
+    ]) {
+        let command = Content::Command(Command::new(request, token));
+        let frame = BusFrame::from(host.send(&command).expect("a command"));
+        let answered = service
+            .take(&frame, None::<&mut PoseTracker>, None)
+            .expect("a command")
+            .expect("sound");
+        let answer = BusFrame::from(answered.answer.expect("an answer"));
+        match host.take(&answer) {
+            Some(Ok(Content::Answer(answer))) => outcomes.extend(answer.outcome),
+            other => panic!("{other:?}"),
+        }
+    }
+    use Outcome::{Done, NoParameters};
+    assert_eq!(outcomes, [Done, Done, Done, NoParameters, NoParameters]);
+    assert_eq!(
+        service.flags(None::<&PoseTracker>),
+        flag::RECORDING | flag::IDENTIFYING
+    );
+    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None::<&PoseTracker>), None));
+    assert_eq!(service.flags(None::<&PoseTracker>), flag::RECORDING);
 }

@@ -1,6 +1,6 @@
 extern crate std;
 
-use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, tag, word_at};
+use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_at};
 use super::*;
 use crate::can::command::{Command, Content, Mailbox, Request};
 use crate::can::service::{Service, Updates};

@@ -51,3 +51,17 @@ fn what_cannot_be_stored_is_refused_by_kind() {
         assert_eq!(bench.update(begin, 7), (Outcome::BadContent, 0));
     }
 }
+
+/// What the pages say, a host reads: `tests/update`.
+#[test]
+fn a_page_or_a_word_that_is_not_there_is_refused() {
+    let mut bench = Bench::new(Some(KEY));
+    let tell = |bench: &mut Bench, page| bench.update(UpdateRequest::Tell { page }, page);
+    let read = |bench: &mut Bench, index| bench.update(UpdateRequest::ReadBack { index }, 1);
+    let (none, unknown) = ((Outcome::NoParameters, 0), (Outcome::UnknownCommand, 0));
+    assert_eq!(tell(&mut bench, page::COUNT), unknown);
+    assert_eq!(read(&mut bench, 255), unknown);
+    bench.store.runs = false;
+    assert_eq!(tell(&mut bench, page::RUNNING_CRC), none);
+    assert_eq!(read(&mut bench, 255), none);
+}
