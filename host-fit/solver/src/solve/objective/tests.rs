@@ -213,3 +213,21 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
     };
     assert!(Objective::new(&no_ratios, Projection::Linear).is_none());
 }
+
+#[test]
+fn whatever_lies_beyond_a_pole_costs_nan() {
+    let (stage, dataset) = (stage(), dataset(6, 4));
+    let problem = problem(&dataset, &stage, ModelKind::M31);
+    let cost = objective(&problem, Projection::Linear);
+    let sound = individual(&cost, &truth());
+    assert!(cost.cost(&sound) < 3.0);
+    // a / eta of A with phi / eta of 0.06, 0.04, -0.5 in the first row.
+    let [z, rx, ry] = problem.rows.rows[0].vertical;
+    let at_share = |share: f64| {
+        let mut individual = sound.clone();
+        individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;
+        cost.cost(&individual)
+    };
+    assert!(at_share(0.06).is_finite());
+    assert!(at_share(0.04).is_nan() && at_share(-0.5).is_nan());
+}
