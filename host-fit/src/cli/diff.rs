@@ -34,10 +34,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     let paths = [args.a.as_path(), args.b.as_path()];
     super::check_outputs([args.json.path.as_deref()], None, paths)?;
     let [a, b] = [blob_file::read(paths[0])?, blob_file::read(paths[1])?];
-    let errors = [
-        standard_errors(&a, paths[0])?,
-        standard_errors(&b, paths[1])?,
-    ];
+    let errors = [standard_errors(&a, paths[0]), standard_errors(&b, paths[1])];
     let difference = pose_difference(&a, &b);
     let is_compared = difference.is_some();
     let changes = parameter_changes([&a, &b], [&errors[0], &errors[1]]);
@@ -80,14 +77,12 @@ fn blob(path: &Path, set: &ParameterSet) -> Group {
     }
 }
 
-/// The standard errors in the posterior beside a blob; none where there is no such file.
-fn standard_errors(set: &ParameterSet, blob: &Path) -> Result<BTreeMap<String, f64>, HostError> {
-    let Some(known) = posterior_file::read(set, blob)? else {
-        return Ok(BTreeMap::new());
-    };
-    let errors = known.covariance.diagonal().map(f64::sqrt);
-    Ok(names(errors.len())
-        .into_iter()
-        .zip(errors.iter().copied())
-        .collect())
+/// The standard errors in the posterior beside a blob; none without a sound one.
+fn standard_errors(set: &ParameterSet, blob: &Path) -> BTreeMap<String, f64> {
+    let known = posterior_file::read(set, blob).ok().flatten();
+    let errors = known.map_or_else(Vec::new, |known| {
+        let errors = known.covariance.diagonal().map(f64::sqrt);
+        errors.as_slice().to_vec()
+    });
+    names(errors.len()).into_iter().zip(errors).collect()
 }
