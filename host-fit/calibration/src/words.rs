@@ -8,7 +8,7 @@ mod verdict;
 
 pub use finding::message;
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
-pub use verdict::verdict;
+pub use verdict::{up_to, verdict};
 
 use hallstage_input::finding::{Finding, Severity};
 use serde::ser::SerializeStruct;

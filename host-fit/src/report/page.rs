@@ -12,6 +12,7 @@ use super::text::file_name;
 use super::verdict::{Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::white_noise;
+use hallstage_calibration::words;
 use hallstage_input::axis::{AXES, Axis, counted, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
@@ -118,6 +119,10 @@ impl Source<'_> {
             add("model", Model::from_kind(set.model).title());
         }
         add("temperature", self.temperature());
+        let motion = self.subject.diagnosis.motion.as_ref();
+        if let Some(motion) = motion.filter(|_| self.subject.is_field) {
+            add("motion", words::up_to(motion));
+        }
         add(
             "reference",
             "laser interferometers X, Y1, Y2, as logged".to_owned(),

@@ -1,6 +1,7 @@
 //! The meaning of a verdict.
 
 use crate::diagnose::Diagnosis;
+use crate::judge::in_motion::InMotion;
 
 /// The errors in service, and how far from the temperature of the log they hold; `is_field` for the field model, which is
 /// made for service.
@@ -31,11 +32,20 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         let within_k = validity.within_k;
         format!("; good within {within_k:.digits$} K of the temperature of calibration{logged}")
     });
-    let motion = diagnosis.motion.map_or(String::new(), |motion| {
-        let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
-        format!("; up to {acceleration:.2} m/s² and {speed:.0} mm/s rms")
-    });
+    let motion = diagnosis
+        .motion
+        .map_or(String::new(), |motion| format!("; {}", up_to(&motion)));
     format!(
         "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}{motion}"
     )
+}
+
+/// The motion up to which errors are good.
+pub fn up_to(motion: &InMotion) -> String {
+    let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
+    let open = match motion.fit.is_determined {
+        true => "",
+        false => "; the log does not show the effect of more acceleration",
+    };
+    format!("good up to {acceleration:.2} m/s² and {speed:.0} mm/s rms{open}")
 }
