@@ -62,6 +62,7 @@ pub fn sign(unit: &str) -> &str {
         "um" => "µm",
         "urad" => "µrad",
         "us" => "µs",
+        "um/(m/s2)" => "µm/(m/s²)",
         "degC" => "°C",
         unit => unit,
     }

@@ -51,6 +51,7 @@ impl Unit {
                 unit.to_lowercase()
                     .replace("1/", "per_")
                     .replace('/', "_per_")
+                    .replace(['(', ')'], "")
             ),
         }
     }
