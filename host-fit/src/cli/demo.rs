@@ -5,7 +5,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::pose_file::{DecodeSettings, PoseFormat, decode_log};
 use crate::output::{self, Output, Outputs, posterior_file};
-use crate::report::errors::{self, error_table, to_micro};
+use crate::report::errors::{self, RowErrors, error_table, to_micro};
 use crate::report::parameters::{self, parameters};
 use crate::report::text::as_text;
 use clap::Args;
@@ -20,8 +20,9 @@ use hallstage_input::log::{self, ReadOptions};
 use hallstage_input::shipped::{FILES, STAGE_TOML};
 use hallstage_input::stage::Stage;
 use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::dynamics::Dynamics;
 use hallstage_simulate::protocol::{Protocol, REST_S, Run};
-use hallstage_simulate::recording::{Recording, record_in};
+use hallstage_simulate::recording::{Recording, record_in, record_stage};
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_simulate::thermal::{Climate, Thermal};
 use hallstage_solver::estimator::model::Model;
@@ -42,6 +43,9 @@ pub(super) struct DemoArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
+
+/// Length of the runs that are fitted, s.
+const RUN_S: f64 = 30.0;
 
 const PREFACE: &str = "\
 The paper's stage is not this one, so its figures show what to expect, not what to match: comparable
@@ -227,7 +231,8 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         + "\nf32 against f64, largest\n"
         + &rounding("Model (31), its own log", &model_31, &paper)?
         + &rounding("field model, in service", &field, &service)?
-        + &day(&stage)?;
+        + &day(&stage)?
+        + &fast_moves(&stage)?;
     Ok((text, files))
 }
 
@@ -247,7 +252,7 @@ fn day(stage: &Stage) -> Result<String, HostError> {
             hour,
         )?)
     };
-    let cold = planned(30.0, -1.0 / 6.0)?;
+    let cold = planned(RUN_S, -1.0 / 6.0)?;
     let (early, warm) = (planned(8.0, 1.0 / 6.0)?, planned(8.0, 3.5)?);
     let day = record(Protocol::Day.run(stage.servo_period_s, SEED), 0.0)?;
     let mut blind = cold.clone();
@@ -255,17 +260,45 @@ fn day(stage: &Stage) -> Result<String, HostError> {
     samples.for_each(|sample| sample.temperature_mc = [MISSING_CODE; 2]);
     let day = day.dataset_with_truth(stage).unwrap_or_default();
     let ratios = |logs: &[&Recording]| -> Result<String, HostError> {
-        let dataset = Recording::joined(logs, stage).unwrap_or_default();
-        let model = ModelChoice::Named(Model::from_kind(ModelKind::Field));
-        let fit = fit(&dataset, stage, &FitSettings::new(model))?;
+        let fit = field_fit(logs, stage)?;
         let errors = Decoded::new(&fit.set, &day).rezeroed(&day, REST_S);
-        let [x, y, rz] = over_noise(&errors, &day.movements);
-        Ok(format!("{x:.2} / {y:.2} / {rz:.2}"))
+        Ok(in_noise(&errors, &day))
     };
     let (with, without) = (ratios(&[&cold, &early, &warm])?, ratios(&[&blind])?);
     Ok(format!(
         "\na simulated day, body 5 K warmer: rms of X / Y / Rz over the noise {with}; without temperature {without}\n"
     ))
+}
+
+/// A line about fast moves of a simulated stage with late probes and arms that bend.
+fn fast_moves(stage: &Stage) -> Result<String, HostError> {
+    const SEED: u64 = 7;
+    let dynamics = Dynamics::draw([3e-4, -3e-4, 0.0], None, Some(120.0), SEED);
+    let record = |run| record_stage(stage, run, None, dynamics, SEED);
+    let planned = plan(stage, RUN_S)?.run.trajectory(stage.servo_period_s);
+    let fit = field_fit(&[&record(Run::planned(planned))?], stage)?;
+    let fast = record(Protocol::Fast.run(stage.servo_period_s, SEED))?;
+    let fast = fast.dataset_with_truth(stage).unwrap_or_default();
+    let decoded = Decoded::new(&fit.set, &fast);
+    let correction = fit.set.motion_correction.unwrap_or_default();
+    let corrected = decoded.corrected(&correction, &fast);
+    let [without, with] = [decoded, corrected].map(|decoded| in_noise(&decoded.errors, &fast));
+    Ok(format!(
+        "fast moves, probes up to 0.6 ms apart, arms that bend: {without}; with the motion correction {with}\n"
+    ))
+}
+
+/// A fit of the field model to these recordings.
+fn field_fit(logs: &[&Recording], stage: &Stage) -> Result<Fit, HostError> {
+    let dataset = Recording::joined(logs, stage).unwrap_or_default();
+    let model = ModelChoice::Named(Model::from_kind(ModelKind::Field));
+    Ok(fit(&dataset, stage, &FitSettings::new(model))?)
+}
+
+/// rms of errors of X / Y / Rz over their noise.
+fn in_noise(errors: &RowErrors, dataset: &Dataset) -> String {
+    let [x, y, rz] = over_noise(errors, &dataset.movements);
+    format!("{x:.2} / {y:.2} / {rz:.2}")
 }
 
 /// The largest difference of the target's `f32` from `f64` over the rows of a log, in a line.

@@ -168,6 +168,19 @@ fn demo_prints_the_tables_of_the_paper_beside_ours() {
     ] {
         assert!(text.contains(part), "{part}");
     }
+    let line = text.lines().find(|line| line.starts_with("fast moves"));
+    let figures = line.unwrap_or_default().split([' ', ';']);
+    let ratios: Vec<f64> = figures.filter_map(|word| word.parse().ok()).collect();
+    let [.., x, y, _, corrected_x, corrected_y, corrected_rz] = ratios[..] else {
+        panic!("{text}");
+    };
+    assert!(x > 1.5 && y > 1.5, "{line:?}");
+    assert!(
+        [corrected_x, corrected_y, corrected_rz]
+            .iter()
+            .all(|r| *r < 1.03),
+        "{line:?}"
+    );
     for file in ["params.bin", "pose.csv", "paper.csv.gz", "stage.toml"] {
         assert!(bench.has(&format!("demo/{file}")), "{file}");
     }
