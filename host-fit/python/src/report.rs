@@ -25,7 +25,7 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
         title: "",
         verdict: Summary::new(subject),
         facts: Vec::new(),
-        causes: Cause::of(&subject.diagnosis.findings),
+        causes: Cause::grouped(&subject.diagnosis.findings),
         warnings,
         sections: Vec::new(),
     };

@@ -226,11 +226,11 @@ impl Outcome {
     ) -> Option<Report> {
         let fit = self.fitted.as_ref().ok()?;
         let judged = (&self.diagnosis, self.refusal.as_ref());
-        let of_log = (log, stage);
+        let log_and_stage = (log, stage);
         Some(Report::from_fit(
             fit,
             &order.settings,
-            of_log,
+            log_and_stage,
             elapsed_s,
             judged,
         ))

@@ -1,11 +1,113 @@
-//! Parsers of arguments that several commands take.
+//! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
+use super::interrupt;
 use crate::calibrate::Choice;
+use crate::cli::error::HostError;
+use crate::cli::terminal;
+use crate::output::Outputs;
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use hallstage_input::log::{self, LogReading, ReadOptions};
+use hallstage_input::stage::Stage;
 use runtime::OnInvalid;
 use runtime::parameters::Text;
 use std::num::ParseIntError;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+/// The stage file of a command.
+#[derive(Debug, Args)]
+pub(super) struct StageFile {
+    /// The stage as designed.
+    #[arg(
+        id = "stage",
+        long = "stage",
+        value_name = "FILE",
+        default_value = "stage.toml"
+    )]
+    pub(super) path: PathBuf,
+}
+
+impl StageFile {
+    pub(super) fn read(&self) -> Result<Stage, HostError> {
+        Ok(Stage::from_file(&self.path)?)
+    }
+}
+
+/// Logs of a stage, and how they are read.
+#[derive(Debug, Args)]
+pub(super) struct Logs {
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
+    #[arg(required = true, value_name = "LOG")]
+    pub(super) paths: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) stage: StageFile,
+}
+
+impl Logs {
+    /// The files that are read.
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        (self.paths.iter().chain([&self.stage.path])).map(PathBuf::as_path)
+    }
+
+    /// How they are read, by the arguments and the command.
+    pub(super) fn options(&self, command: ReadOptions) -> ReadOptions {
+        ReadOptions {
+            watch: interrupt::WATCH,
+            ..command
+        }
+    }
+
+    /// Reads them.
+    pub(super) fn read(
+        &self,
+        stage: &Stage,
+        command: ReadOptions,
+    ) -> Result<LogReading, HostError> {
+        let options = self.options(command);
+        let read = || log::read(&self.paths, stage, &options);
+        Ok(terminal::timed("reading", read)?)
+    }
+}
+
+/// Where the figures of a command go.
+#[derive(Debug, Args)]
+pub(super) struct Json {
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(id = "json", long = "json", value_name = "FILE")]
+    pub(super) path: Option<PathBuf>,
+}
+
+impl Json {
+    /// Adds the figures to the outputs, if they are asked for.
+    pub(super) fn add(
+        &self,
+        outputs: &mut Outputs,
+        result: &impl serde::Serialize,
+    ) -> Result<(), HostError> {
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        let text = serde_json::to_string_pretty(result)? + "\n";
+        Ok(outputs.add(path, text.as_bytes())?)
+    }
+
+    /// Writes the figures of a command that has no other output, if they are asked for.
+    pub(super) fn write(&self, result: &impl serde::Serialize) -> Result<(), HostError> {
+        let mut outputs = Outputs::default();
+        self.add(&mut outputs, result)?;
+        outputs.commit()?;
+        Ok(())
+    }
+}
+
+/// How many threads work.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Threads {
+    /// Threads; all cores if not given. The result does not depend on it.
+    #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) number: Option<u16>,
+}
 
 /// Parses a [`Choice`].
 pub(crate) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {

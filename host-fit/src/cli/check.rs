@@ -1,6 +1,6 @@
 //! `host-fit check`.
 
-use super::args::{Json, Logs};
+use super::arguments::{Json, Logs};
 use super::fit::Job;
 use super::interrupt;
 use super::report::Report;

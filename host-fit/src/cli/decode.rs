@@ -1,7 +1,6 @@
 //! `host-fit decode`.
 
-use super::args::StageFile;
-use super::arguments::{choice, hold};
+use super::arguments::{StageFile, choice, hold};
 use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;

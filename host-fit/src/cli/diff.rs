@@ -1,6 +1,6 @@
 //! `host-fit diff`.
 
-use super::args::Json;
+use super::arguments::Json;
 use super::inspect::errors;
 use crate::cli::error::HostError;
 use crate::cli::terminal;

@@ -1,7 +1,6 @@
 //! `host-fit eval`.
 
-use super::args::{Json, Logs};
-use super::arguments::choice;
+use super::arguments::{Json, Logs, choice};
 use super::report::{Report, finish};
 use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
@@ -68,8 +67,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     args.json.add(&mut outputs, &report)?;
     args.report.add(&mut outputs, || {
         let what = ("Verification of a calibration", set.serial.as_str());
-        let of_log = (&evaluation.log, &stage);
-        let mut source = args.report.source(what, &args.logs, of_log, subject);
+        let log_and_stage = (&evaluation.log, &stage);
+        let mut source = args.report.source(what, &args.logs, log_and_stage, subject);
         let blob = blob_file::to_bytes(&args.params, &set)?;
         let provenance = &mut source.provenance;
         provenance.add_bytes(&args.params, &blob, "parameter blob, judged");

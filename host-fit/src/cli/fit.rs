@@ -1,7 +1,6 @@
 //! `host-fit fit`.
 
-use super::args::{Json, Logs, Threads};
-use super::arguments::choice;
+use super::arguments::{Json, Logs, Threads, choice};
 use super::interrupt;
 use super::report::finish;
 use crate::calibrate::{FitOptions, FitOrder};
@@ -78,8 +77,8 @@ impl Job<'_> {
         let log = logs.read(&stage, options)?;
         let outcome = terminal::timed("fit and diagnosis", || self.order.run(&log, &stage));
         let outcome = outcome.map_err(HostError::from_calibrate)?;
-        let of_log = (&log, &stage);
-        let report = outcome.report(&self.order, of_log, started.elapsed().as_secs_f64());
+        let log_and_stage = (&log, &stage);
+        let report = outcome.report(&self.order, log_and_stage, started.elapsed().as_secs_f64());
         let subject = outcome.subject();
         let mut outputs = Outputs::default();
         match &report {
@@ -90,7 +89,7 @@ impl Job<'_> {
         let kept = kept.zip(outcome.fitted.as_ref().ok());
         page.add(&mut outputs, || {
             let what = (self.title, self.order.settings.serial.as_str());
-            let mut source = page.source(what, logs, of_log, subject);
+            let mut source = page.source(what, logs, log_and_stage, subject);
             source.report = report.as_ref();
             if let Some((path, fit)) = kept {
                 let blob = blob_file::to_bytes(path, &fit.set)?;

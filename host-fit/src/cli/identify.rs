@@ -1,6 +1,6 @@
 //! `host-fit identify`.
 
-use super::args::Json;
+use super::arguments::Json;
 use super::interrupt;
 use crate::bus::BusAddress;
 use crate::bus::update::{Identity, on, talk_to};

@@ -1,6 +1,6 @@
 //! `host-fit inspect`.
 
-use super::args::Json;
+use super::arguments::Json;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{blob_file, posterior_file};

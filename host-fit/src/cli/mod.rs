@@ -1,7 +1,6 @@
 //! The command line: arguments, printed texts and exit status of each command.
 //! One file a command; the work is the library's.
 
-mod args;
 pub(crate) mod arguments;
 mod check;
 mod decode;
@@ -230,7 +229,7 @@ fn check_outputs<'p>(
 /// Reads a blob and its stage. A blob that was made for other scales than `stage.toml` gives is refused.
 fn blob_of_stage(
     blob: &Path,
-    stage_file: &args::StageFile,
+    stage_file: &arguments::StageFile,
 ) -> Result<(ParameterSet, Stage), HostError> {
     let set = blob_file::read(blob)?;
     let stage = stage_file.read()?;

@@ -1,7 +1,6 @@
 //! `host-fit plan`.
 
-use super::args::{Json, StageFile};
-use super::arguments::between;
+use super::arguments::{Json, StageFile, between};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;

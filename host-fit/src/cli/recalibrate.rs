@@ -1,7 +1,6 @@
 //! `host-fit recalibrate`.
 
-use super::args::{Json, Logs};
-use super::arguments::choice;
+use super::arguments::{Json, Logs, choice};
 use super::report::finish;
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;

@@ -1,7 +1,6 @@
 //! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
 
-use super::args::Logs;
-use super::arguments::blob_text;
+use super::arguments::{Logs, blob_text};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, make_folder};

@@ -1,7 +1,6 @@
 //! `host-fit simulate`.
 
-use super::args::StageFile;
-use super::arguments::{between, choice};
+use super::arguments::{StageFile, between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;

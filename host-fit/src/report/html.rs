@@ -42,7 +42,7 @@ pub struct Cause<'a> {
 
 impl<'a> Cause<'a> {
     /// Findings in order, the most severe first.
-    pub fn of(findings: &'a [Finding]) -> Vec<Self> {
+    pub fn grouped(findings: &'a [Finding]) -> Vec<Self> {
         let mut causes: Vec<Self> = Vec::new();
         for found in findings {
             match causes.iter_mut().find(|cause| cause.code == found.code()) {

@@ -93,7 +93,7 @@ impl Source<'_> {
             title: self.title,
             verdict: Summary::new(&self.subject),
             facts: self.facts(),
-            causes: Cause::of(&self.subject.diagnosis.findings),
+            causes: Cause::grouped(&self.subject.diagnosis.findings),
             warnings: &self.warnings,
             sections,
         };
