@@ -17,12 +17,6 @@ const BINS: usize = 40;
 /// A quantity of a row in um or urad, and its name.
 type Quantity = (&'static str, fn(&Row) -> f64);
 
-/// Temperatures, where the log has them.
-const TEMPERATURES: [Quantity; 2] = [
-    ("mount, °C", |row| celsius(row, 0)),
-    ("body, °C", |row| celsius(row, 1)),
-];
-
 fn celsius(row: &Row, sensor: usize) -> f64 {
     match row.frame.temperature_mc()[sensor] {
         MISSING_CODE => f64::NAN,
@@ -30,8 +24,8 @@ fn celsius(row: &Row, sensor: usize) -> f64 {
     }
 }
 
-/// All else that a log holds, three quantities a chart.
-const QUANTITIES: [Quantity; 9] = [
+/// What errors are shown against, where the log moves it: pose, signals, temperatures.
+const QUANTITIES: [Quantity; 11] = [
     ("X, µm", |row| row.reference[0] * 1e6),
     ("Y, µm", |row| row.reference[1] * 1e6),
     ("Rz, µrad", |row| row.reference[2] * 1e6),
@@ -41,6 +35,8 @@ const QUANTITIES: [Quantity; 9] = [
     ("Z, µm", |row| row.vertical[0] * 1e6),
     ("Rx, µrad", |row| row.vertical[1] * 1e6),
     ("Ry, µrad", |row| row.vertical[2] * 1e6),
+    ("mount, °C", |row| celsius(row, 0)),
+    ("body, °C", |row| celsius(row, 1)),
 ];
 
 /// The planar axes, as charts name them.
@@ -122,8 +118,6 @@ impl Log<'_> {
             let caption = format!("Errors against {}", name.split(',').next().unwrap_or(name));
             (high > low).then(|| Chart::new(caption, (name, Axis(low, high)), panel))
         };
-        (QUANTITIES.iter().chain(&TEMPERATURES))
-            .filter_map(chart)
-            .collect()
+        QUANTITIES.iter().filter_map(chart).collect()
     }
 }

@@ -61,26 +61,13 @@ fn pose(reading: &Reading) -> [f64; 6] {
     [x, y, rz, z, rx, ry]
 }
 
-fn faults(bus: &BusHealth) -> String {
-    format!(
-        "good {}, lost {}, repeated {}, sequence {}, check {}, length {}, late {}, incomplete ticks {}, stale {}",
-        bus.good,
-        bus.lost,
-        bus.repeated,
-        bus.wrong_sequence,
-        bus.wrong_check,
-        bus.wrong_length,
-        bus.late,
-        bus.incomplete,
-        bus.stale
-    )
-}
-
 fn line(shown: &Shown<'_>) -> String {
     let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
+    let bus = &shown.bus;
     format!(
         "{:.1} s {}; X {x:.3} um Y {y:.3} um Rz {rz:.3} urad; Z {z:.3} um Rx {rx:.3} urad Ry {ry:.3} urad; {:.1} ticks/s; \
-         ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical; frames: {}",
+         ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical; \
+         frames: good {}, lost {}, repeated {}, sequence {}, check {}, length {}, late {}, incomplete ticks {}, stale {}",
         shown.elapsed_s,
         state(shown),
         shown.rate_hz,
@@ -90,6 +77,14 @@ fn line(shown: &Shown<'_>) -> String {
         shown.not_sent,
         shown.servo.planar_invalid,
         shown.servo.vertical_invalid,
-        faults(&shown.bus)
+        bus.good,
+        bus.lost,
+        bus.repeated,
+        bus.wrong_sequence,
+        bus.wrong_check,
+        bus.wrong_length,
+        bus.late,
+        bus.incomplete,
+        bus.stale
     )
 }
