@@ -24,24 +24,38 @@ fn over_prior(errors: &[f64; COUNT], k: usize) -> Option<f64> {
     TERMS[k % PER_PROBE].prior.map(|prior| errors[k] / prior)
 }
 
+/// The motion of an axis: key in JSON, title in the table, value in SI units, and whether it is a motion and no frequency.
+fn motion(plan: &Plan, stage: &Stage, k: usize) -> [(&'static str, &'static str, f64, bool); 9] {
+    let (run, limits) = (&plan.run, &stage.motion.axes[k]);
+    let [speed, acceleration] = run.peaks(k);
+    let hz = "frequency, Hz";
+    [
+        ("amplitude", "amplitude", run.amplitudes[k], true),
+        ("service", "in service", limits.service, true),
+        ("frequency_hz", hz, run.frequency_hz(k), false),
+        ("tone", "fast tone", run.tones[k], true),
+        ("tone_frequency_hz", hz, TONES_HZ[k], false),
+        ("peak_speed", "speed, per s", speed, true),
+        ("speed_limit", "limit", limits.speed, true),
+        (
+            "peak_acceleration",
+            "acceleration, per s2",
+            acceleration,
+            true,
+        ),
+        ("acceleration_limit", "limit", limits.acceleration, true),
+    ]
+}
+
 /// The figures of a plan. In JSON the axes are in m and rad.
 pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
     let run = &plan.run;
     let axis = |k: usize| {
-        let ([peak_speed, peak_acceleration], motion) = (run.peaks(k), &stage.motion.axes[k]);
-        json!({
-            "axis": AXES[k].key,
-            "unit": AXES[k].unit,
-            "amplitude": run.amplitudes[k],
-            "service": motion.service,
-            "frequency_hz": run.frequency_hz(k),
-            "tone": run.tones[k],
-            "tone_frequency_hz": TONES_HZ[k],
-            "peak_speed": peak_speed,
-            "speed_limit": motion.speed,
-            "peak_acceleration": peak_acceleration,
-            "acceleration_limit": motion.acceleration,
-        })
+        let mut object = json!({ "axis": AXES[k].key, "unit": AXES[k].unit });
+        for (key, _, value, _) in motion(plan, stage, k) {
+            object[key] = value.into();
+        }
+        object
     };
     let service = &plan.forecast.service;
     let (ratios, floor) = (service.ratios(), service.noise.map(f64::sqrt));
@@ -140,39 +154,17 @@ fn rounded(value: f64, digits: usize) -> f64 {
 
 /// The tables of a plan: the run, errors predicted for service, standard errors.
 pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
-    let run = &plan.run;
-    let mut motion = Table {
+    let titles = motion(plan, stage, 0).map(|(_, title, ..)| title);
+    let mut moves = Table {
         decimals: Some(1),
-        ..Table::new(
-            "motion",
-            &[
-                "amplitude",
-                "in service",
-                "frequency, Hz",
-                "fast tone",
-                "frequency, Hz",
-                "speed, per s",
-                "limit",
-                "acceleration, per s2",
-                "limit",
-            ],
-        )
+        ..Table::new("motion", &titles)
     };
     for (k, axis) in AXES.iter().enumerate() {
-        let (peaks, limits) = (run.peaks(k), &stage.motion.axes[k]);
-        let micro = |x: f64| micro(axis, x);
-        let figures = [
-            micro(run.amplitudes[k]),
-            micro(limits.service),
-            run.frequency_hz(k).into(),
-            micro(run.tones[k]),
-            TONES_HZ[k].into(),
-            micro(peaks[0]),
-            micro(limits.speed),
-            micro(peaks[1]),
-            micro(limits.acceleration),
-        ];
-        motion.row(axis.name, figures);
+        let figures = motion(plan, stage, k).map(|(.., value, is_motion)| match is_motion {
+            true => micro(axis, value),
+            false => value.into(),
+        });
+        moves.row(axis.name, figures);
     }
     let standard_errors = plan.forecast.posterior.standard_errors();
     let index = |parameter: &str| (0..COUNT).find(|k| name(*k) == parameter);
@@ -184,7 +176,7 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
         Some(vec![bare(rounded(standard_errors[k], 2), unit), of_prior])
     });
     let mut all = figures(plan, protocol, stage).tables();
-    all.splice(1..1, [motion]);
+    all.splice(1..1, [moves]);
     all.push(errors);
     all
 }
