@@ -4,7 +4,7 @@
 //! holds their information on the parameters, and is a tenth of the work for all that follows. The
 //! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
-use super::derivatives::{SECOND, SIDE};
+use super::derivatives::{SIDE, second_derivatives};
 use super::dynamics::{ARM_M, Dynamics};
 use crate::estimator::robust::HALF;
 use hallstage_input::dataset::{Dataset, Row};
@@ -25,8 +25,6 @@ const MOVING_ROWS_MIN: usize = 8;
 const IDLE_ROWS: usize = 2;
 /// A movement of less than this share of the largest one stands still.
 const IDLE_SHARE: f64 = 0.01;
-/// Steps between rows that differ by more than this part of their mean are no even samples.
-const UNEVEN: f64 = 0.2;
 
 /// One row.
 #[derive(Clone, Copy, Debug)]
@@ -290,35 +288,19 @@ fn speed(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
 }
 
 /// Acceleration of X, Y, Rz, Z, Rx, Ry at a row, SI; near an end of a movement that of the nearest row with a whole window, and zero
-/// where rows are missing.
+/// where many rows are missing.
 fn acceleration(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
     let movement = &dataset.movements[dataset.rows[index].movement].rows;
     let middle = index
         .min(movement.end.saturating_sub(SIDE + 1))
         .max(movement.start + SIDE);
-    let window = middle - SIDE..middle + SIDE + 1;
-    let mut sum = [0.0; 6];
-    if window.end > movement.end || trusted[window.clone()].contains(&false) {
-        return sum;
+    if middle >= movement.end {
+        return [0.0; 6];
     }
-    let window = &dataset.rows[window];
-    let Some(period_s) = period_s(window) else {
-        return sum;
-    };
-    for (row, weight) in window.iter().zip(SECOND) {
-        for (sum, x) in sum.iter_mut().zip(pose(row)) {
-            *sum += weight * x;
-        }
-    }
-    sum.map(|sum| sum / (period_s * period_s))
-}
-
-/// The time between rows where all steps are alike.
-fn period_s(rows: &[Row]) -> Option<f64> {
-    let steps = || rows.windows(2).map(|pair| pair[1].t_us - pair[0].t_us);
-    let (least, most) = (steps().min()?, steps().max()?);
-    let mean_s = steps().sum::<i64>() as f64 * 1e-6 / (rows.len() - 1) as f64;
-    (least > 0 && (most - least) as f64 <= UNEVEN * least as f64).then_some(mean_s)
+    let window = middle - SIDE..(middle + SIDE + 1).min(movement.end);
+    let used = window.filter(|&k| trusted[k]).map(|k| &dataset.rows[k]);
+    let time_s = |row: &Row| (row.t_us - dataset.rows[middle].t_us) as f64 * 1e-6;
+    second_derivatives(used.map(|row| (time_s(row), pose(row)))).unwrap_or([0.0; 6])
 }
 
 /// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI.
