@@ -279,3 +279,23 @@ impl<T: Into<Figure>> FromIterator<T> for Figure {
         Self::List(all.into_iter().map(Into::into).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_of_a_figure_ends_with_its_unit() {
+        for (unit, suffix) in [
+            ("", ""),
+            ("um", "_um"),
+            ("%", "_percent"),
+            ("degC", "_c"),
+            ("1/K", "_per_k"),
+            ("um/(m/s2)", "_um_per_m_per_s2"),
+        ] {
+            assert_eq!(figure(1.0, unit).unit().suffix(), suffix);
+        }
+        assert_eq!(bare(1.0, "um").unit().suffix(), "");
+    }
+}
