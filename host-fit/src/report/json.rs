@@ -37,13 +37,28 @@ impl Serialize for Group {
             };
             let suffix = figure.unit().suffix();
             map.serialize_entry(&format!("{name}{suffix}"), figure)?;
-            if let Figure::Number {
-                error: Some(error), ..
-            } = figure
-            {
-                map.serialize_entry(&format!("standard_error{suffix}"), error)?;
+            let errors = standard_errors(figure);
+            if errors != Figure::None {
+                map.serialize_entry(&format!("standard_error{suffix}"), &errors)?;
             }
         }
         map.end()
+    }
+}
+
+/// The standard error of a figure, or those of a list where all are known.
+fn standard_errors(figure: &Figure) -> Figure {
+    match figure {
+        Figure::Number {
+            error: Some(error), ..
+        } => (*error).into(),
+        Figure::List(all) if !all.is_empty() => {
+            let errors: Vec<_> = all.iter().map(standard_errors).collect();
+            match errors.contains(&Figure::None) {
+                true => Figure::None,
+                false => Figure::List(errors),
+            }
+        }
+        _ => Figure::None,
     }
 }

@@ -170,7 +170,7 @@ impl Report {
     /// | `correlations` | pairs of parameters with a correlation above 0.95 or below -0.95 |
     /// | `errors_solver_delta` | errors with the solver's own zero deviations |
     /// | `field` | figures of a fit of the field model; null for other models |
-    /// | `probe_motion` | lags of A, B, C behind their mean; what the acceleration of X, Y, Rz, Z, Rx, Ry (rotations at 0.25 m) adds to the readings of A, then B, then C; the matrices of the correction, SI |
+    /// | `probe_motion` | lags of A, B, C behind their mean; what the acceleration of X, Y, Rz, Z, Rx, Ry (rotations at 0.25 m) adds to the readings of A, then B, then C; standard errors of both; the matrices of the correction, SI |
     /// | `reference_lag` | lag of the reference, positive where it shows an earlier pose, and whether it was taken off; null where no motion shows it |
     pub fn from_fit(
         fit: &Fit,
