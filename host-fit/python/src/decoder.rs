@@ -3,6 +3,7 @@
 use crate::arrays::{codes, reals, same_rows, slice};
 use crate::error::{blob_error, log_error, posterior_error, wrong};
 use crate::log::Log;
+use crate::motion::Commanded;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::{LogReading, ReadOptions};
@@ -22,7 +23,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Words of a record: X, Y, Rz, Z, Rx, Ry, status.
-const WORDS: usize = 7;
+pub const WORDS: usize = 7;
 /// The fields of a record, as in `host-fit decode --format npy`.
 const FIELDS: [(&str, &str); WORDS] = [
     ("x_m", "<f4"),
@@ -76,8 +77,15 @@ impl Decoder {
     /// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
     /// shows as missed frames.
     ///
-    /// Raises `ValueError` with the name of an argument of wrong shape or dtype.
-    #[pyo3(signature = (log = None, *, hall = None, caps = None, mount = None, body = None, hold = 0))]
+    /// `velocity`, `acceleration`: commanded motion of X, Y, Rz at each row, (n, 3), m/s, m/s, rad/s and m/s2, m/s2,
+    /// rad/s2, in the frame of the pose. The motion correction of the parameters then takes off the errors that
+    /// follow motion. Both come from the trajectory, for the sample of the row. A held pose is the last corrected one.
+    ///
+    /// Raises `ValueError` with the name of an argument of wrong shape or dtype, of a motion without the other, and of one
+    /// that is not finite or meets parameters without a motion correction.
+    #[pyo3(signature = (
+        log = None, *, hall = None, caps = None, mount = None, body = None, velocity = None, acceleration = None, hold = 0
+    ))]
     #[expect(
         clippy::too_many_arguments,
         reason = "each is named where it is called"
@@ -90,15 +98,19 @@ impl Decoder {
         caps: Option<&Bound<'py, PyAny>>,
         mount: Option<&Bound<'py, PyAny>>,
         body: Option<&Bound<'py, PyAny>>,
+        velocity: Option<&Bound<'py, PyAny>>,
+        acceleration: Option<&Bound<'py, PyAny>>,
         hold: u16,
     ) -> PyResult<Bound<'py, PyAny>> {
         let on_invalid = match hold {
             0 => OnInvalid::Zero,
             ticks => OnInvalid::Hold { ticks },
         };
+        let commanded = Commanded::new(self.set.motion_correction, velocity, acceleration)?;
         let (hall, caps) = match (log, hall, caps) {
             (Some(log), None, None) if mount.is_none() && body.is_none() => {
-                return records(py, self.statuses(py, log.get(), on_invalid)?);
+                let words = self.statuses(py, log.get(), on_invalid)?;
+                return records(py, words, ("log", commanded));
             }
             (None, Some(hall), Some(caps)) => (hall, caps),
             (Some(_), ..) => {
@@ -129,7 +141,7 @@ impl Decoder {
             });
             py.check_signals()?;
         }
-        records(py, words)
+        records(py, words, ("hall", commanded))
     }
 
     /// Standard uncertainty of X, Y, Rz of each row, float64, (n, 3), m, m, rad: by the parameters and by the
@@ -318,8 +330,15 @@ fn temperatures(
     Ok(Some(all))
 }
 
-/// Words as an array of records, without a copy.
-fn records(py: Python<'_>, words: Vec<u32>) -> PyResult<Bound<'_, PyAny>> {
+/// Words as an array of records, without a copy, corrected by the motion commanded at each row of an argument.
+fn records<'py>(
+    py: Python<'py>,
+    mut words: Vec<u32>,
+    (argument, commanded): (&str, Option<Commanded<'_>>),
+) -> PyResult<Bound<'py, PyAny>> {
+    if let Some(commanded) = commanded {
+        commanded.correct(&mut words, argument)?;
+    }
     let dtype = py
         .import("numpy")?
         .getattr("dtype")?

@@ -13,6 +13,7 @@ mod finding;
 mod fit;
 mod log;
 mod minimize;
+mod motion;
 mod origin;
 mod plan;
 mod program;

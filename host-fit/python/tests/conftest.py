@@ -39,13 +39,36 @@ def cal(run30: hs.Log) -> hs.Calibration:
     return hs.fit(run30, serial="S11", created="2026-11-25")
 
 
-@pytest.fixture
-def host_fit(tmp_path: Path) -> HostFit:
-    """Runs the program in a folder of its own, which it gives."""
+def program_in(folder: Path) -> HostFit:
+    """Runs the program in a folder, which it gives."""
 
     def run(*arguments: str | Path) -> Path:
         program = Path(sys.executable).parent / "host-fit"
-        subprocess.run([program, "-q", *arguments], cwd=tmp_path, check=True)
-        return tmp_path
+        subprocess.run([program, "-q", *arguments], cwd=folder, check=True)
+        return folder
 
     return run
+
+
+@pytest.fixture
+def host_fit(tmp_path: Path) -> HostFit:
+    """Runs the program in a folder of its own."""
+    return program_in(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def coils(tmp_path_factory: pytest.TempPathFactory, stage: hs.Stage) -> Path:
+    """Logs of a stage with motor coils beside its probes, which are read at three instants: a planned run, run.csv.gz,
+    and fast moves, fast.csv.gz, with their true poses, truth.csv."""
+    folder = tmp_path_factory.mktemp("coils")
+    simulate = ["simulate", "--stage", DATA / "stage.toml", "--coil-cm", "5", "--probe-lag-us=200,0,-200", "--seed", "8"]
+    hs.plan(stage, seconds=30).save(folder / "plan.csv")
+    host_fit = program_in(folder)
+    host_fit(*simulate, "--plan", "plan.csv", "--out", "run.csv.gz")
+    return host_fit(*simulate, "--protocol", "fast", "--out", "fast.csv.gz", "--truth", "truth.csv")
+
+
+@pytest.fixture(scope="session")
+def in_motion(coils: Path, stage: hs.Stage) -> hs.Calibration:
+    """The calibration of a stage with coils and late probes."""
+    return hs.fit(hs.read_log(coils / "run.csv.gz", stage), model="field")

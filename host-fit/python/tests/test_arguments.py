@@ -26,7 +26,9 @@ def wrong_values() -> Iterator[Any]:
     yield np.lib.stride_tricks.as_strided(np.zeros(1), (ROWS,), (0,))
 
 
-def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callable[..., Any], dict[str, Any]]]:
+def calls(
+    folder: Path, run30: hs.Log, cal: hs.Calibration, in_motion: hs.Calibration
+) -> list[tuple[Callable[..., Any], dict[str, Any]]]:
     """Functions with sound arguments by name."""
     stage = run30.stage
     x, y, rz = run30.reference[:ROWS].T
@@ -37,7 +39,7 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
         "units": "m", "angles": "rad", "name": "a", "bad_rows": "refuse",
     }  # fmt: skip
     log = hs.Log.from_arrays(**arrays)
-    decoder = cal.decoder()
+    decoder = in_motion.decoder()
     cal.save(folder / "p.bin")
     fit = {
         "log": log, "model": "31", "solver": "lm", "project": "linear", "loss": "none", "train": 100,
@@ -51,6 +53,10 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
     minimize = {
         "fun": lambda x: float(x.sum()), "bounds": [(0, 1)] * 2, "method": "tlbo", "seed": 1, "population": 4,
         "maxiter": 1, "maxfev": 9, "x0": [0, 1], "vectorized": False,
+    }  # fmt: skip
+    decode = {
+        "log": None, "hall": hall, "caps": caps, "mount": np.zeros(ROWS), "body": np.zeros(ROWS),
+        "velocity": np.zeros((ROWS, 3)), "acceleration": np.zeros((ROWS, 3)), "hold": 2,
     }  # fmt: skip
     return [
         (hs.Stage.load, {"path": DATA / "stage.toml"}),
@@ -67,7 +73,7 @@ def calls(folder: Path, run30: hs.Log, cal: hs.Calibration) -> list[tuple[Callab
         (cal.report, {"path": folder / "r.html", "operator": "me", "notes": {"a": "b"}}),
         (cal.residuals().asd, {"axis": "x"}),
         (hs.Decoder.open, {"path": folder / "p.bin"}),
-        (decoder, {"log": None, "hall": hall, "caps": caps, "mount": np.zeros(ROWS), "body": np.zeros(ROWS), "hold": 2}),
+        (decoder, decode),
         (decoder.uncertainty, {"hall": hall, "caps": caps, "mount": np.zeros(ROWS), "body": np.zeros(ROWS)}),
         (hs.plan, {"stage": stage, "seconds": 4.0}),
         (hs.simulate, {"stage": stage, "run": np.zeros((9, 6)), "seed": 1}),
@@ -82,12 +88,12 @@ def names_it(error: Exception, argument: str) -> bool:
 
 
 def test_no_argument_leads_to_a_panic_and_each_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run30: hs.Log, cal: hs.Calibration
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run30: hs.Log, cal: hs.Calibration, in_motion: hs.Calibration
 ) -> None:
     monkeypatch.chdir(tmp_path)
     silent: list[str] = []
     tried = refused = 0
-    for function, sound in calls(tmp_path, run30, cal):
+    for function, sound in calls(tmp_path, run30, cal, in_motion):
         for argument, value in itertools.product(sound, wrong_values()):
             tried += 1
             try:

@@ -237,6 +237,8 @@ class Decoder:
         caps: ArrayLike | None = None,
         mount: ArrayLike | None = None,
         body: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
         hold: int = 0,
     ) -> NDArray[np.void]: ...
     def uncertainty(

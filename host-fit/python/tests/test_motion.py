@@ -1,0 +1,99 @@
+"""Poses of a moving stage are corrected as in the controller."""
+
+from pathlib import Path
+from typing import Any
+
+import hallstage as hs
+import numpy as np
+import pytest
+
+AXES = ["x_m", "y_m", "rz_rad"]
+
+
+def planar(poses: np.ndarray) -> np.ndarray:
+    return np.stack([poses[axis] for axis in AXES], axis=1)
+
+
+@pytest.fixture(scope="module")
+def fast(coils: Path, stage: hs.Stage) -> hs.Log:
+    return hs.read_log(coils / "fast.csv.gz", stage)
+
+
+@pytest.fixture(scope="module")
+def commanded(coils: Path, fast: hs.Log) -> dict[str, Any]:
+    """The motion of the true poses."""
+    truth = np.genfromtxt(coils / "truth.csv", delimiter=",", names=True)
+    pose = np.stack([truth[name] for name in ["x_nm", "y_nm", "rz_nrad"]], axis=1) * 1e-9
+    motion = {name: np.zeros_like(pose) for name in ["velocity", "acceleration"]}
+    for rows in np.split(np.arange(len(pose)), np.flatnonzero(np.diff(fast.movement)) + 1):
+        motion["velocity"][rows] = np.gradient(pose[rows], 0.002, axis=0)
+        motion["acceleration"][rows] = np.gradient(motion["velocity"][rows], 0.002, axis=0)
+    return motion
+
+
+def test_a_fit_shows_lags_and_accelerations_with_their_errors(in_motion: hs.Calibration) -> None:
+    assert in_motion.figures is not None
+    found = in_motion.figures["probe_motion"]
+    assert np.all(np.abs(np.array(found["lag_us"]) - [200, 0, -200]) < 4 * np.array(found["standard_error_us"]))
+    by_acceleration = np.abs(found["by_acceleration_um_per_m_per_s2"])
+    assert by_acceleration.max() > 5
+    assert np.all(np.array(found["standard_error_um_per_m_per_s2"]) < 1)
+    # More than what would leave it good.
+    assert in_motion.figures["valid_up_to"]["acceleration_m_s2"] < 0.1 and in_motion.verdict == "limited"
+
+
+def test_fast_moves_have_the_errors_that_an_evaluation_expects(
+    in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
+) -> None:
+    dec = in_motion.decoder()
+    bare, corrected = (np.std(planar(p) - fast.reference, axis=0) for p in [dec(fast), dec(fast, **commanded)])
+    assert np.all(corrected < 0.5 * bare)
+    of = in_motion.evaluate(fast).figures["errors_corrected"]
+    expected = [of["x"]["rmse_um"], of["y"]["rmse_um"], of["rz"]["rmse_urad"]]
+    assert np.allclose(corrected * 1e6, expected, rtol=0.05)
+
+
+def test_the_correction_is_that_of_the_controller_bit_for_bit(
+    in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
+) -> None:
+    assert in_motion.figures is not None
+    of = in_motion.figures["probe_motion"]["correction"]
+    dec = in_motion.decoder()
+    wanted = planar(dec(fast))
+    for matrix, motion in [("acceleration_s2", "acceleration"), ("velocity_s", "velocity")]:
+        for k in range(3):
+            wanted += np.array(of[matrix], "f4")[:, k] * commanded[motion][:, k : k + 1].astype("f4")
+    assert wanted.dtype == np.float32
+    corrected = dec(fast, **commanded)
+    assert np.array_equal(planar(corrected).view("u4"), wanted.view("u4"))
+    assert np.array_equal(dec(hall=fast.hall, caps=fast.caps, **commanded), corrected)
+
+
+def test_a_held_pose_is_the_last_corrected_one(in_motion: hs.Calibration, fast: hs.Log) -> None:
+    dec, hall = in_motion.decoder(), fast.hall[:9].copy()
+    hall[5:8, 0] = 32767
+    motion = {"velocity": np.zeros((9, 3)), "acceleration": np.linspace(1, 2, 27).reshape(9, 3)}
+    assert fast.caps is not None
+    zero, held = (planar(dec(hall=hall, caps=fast.caps[:9], **motion, hold=hold)) for hold in [0, 2])  # type: ignore[arg-type]
+    assert np.all(zero[5:8] == 0) and np.all(held[5:7] == zero[4]) and np.all(held[7] == 0)
+    assert np.array_equal(held[[*range(5), 8]], zero[[*range(5), 8]])
+
+
+def test_a_motion_that_cannot_be_used_is_named(
+    cal: hs.Calibration, in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
+) -> None:
+    v, a = commanded["velocity"], commanded["acceleration"]
+    endless = a.copy()
+    endless[7, 2] = np.inf
+    cases: list[tuple[dict[str, Any], str]] = [
+        ({"velocity": v}, "acceleration: is missing"), ({"acceleration": a}, "velocity: is missing"),
+        ({"velocity": v[:5], "acceleration": a}, "velocity: 5 rows, but log has"),
+        ({"velocity": v, "acceleration": a[:5]}, "acceleration: 5 rows, but log has"),
+        ({"velocity": v[:, :2], "acceleration": a}, "velocity: shape"),
+        ({"velocity": v, "acceleration": endless}, "acceleration: row 7: not finite"),
+    ]  # fmt: skip
+    for wrong, words in cases:
+        with pytest.raises(ValueError, match=words):
+            in_motion.decoder()(fast, **wrong)
+    with pytest.raises(ValueError, match="velocity, acceleration: the parameters have no motion correction"):
+        cal.decoder()(fast, **commanded)
