@@ -164,6 +164,7 @@ impl Evaluation {
             is_field: is_field(&self.set),
             errors: Some(&self.judgement.errors),
             limits: own.map(|rms| (rms > 0.0).then_some(self.limit * rms)),
+            corrected: self.corrected.as_ref(),
             in_service: false,
         }
     }

@@ -196,6 +196,7 @@ impl Outcome {
             is_field: self.is_field(),
             errors: self.fitted.as_ref().ok().map(|fit| &fit.judgement.errors),
             limits: self.limits.0,
+            corrected: None,
             in_service: self.in_service().is_some(),
         }
     }

@@ -66,6 +66,7 @@ impl Updated {
             is_field: true,
             errors: Some(&self.new.judgement.errors),
             limits: [None; 3],
+            corrected: None,
             in_service: false,
         }
     }

@@ -43,6 +43,7 @@ fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {
         is_field: false,
         errors: None,
         limits: [None; 3],
+        corrected: None,
         in_service: false,
     }
 }

@@ -39,6 +39,8 @@ pub struct Subject<'a> {
     pub is_field: bool,
     /// Errors over all rows, if there is a fit or a blob.
     pub errors: Option<&'a PoseError>,
+    /// The same with poses corrected by the speed and the acceleration of the reference, for a blob with the correction.
+    pub corrected: Option<&'a PoseError>,
     /// Largest rms errors of X, Y, Rz: m, m, rad.
     pub limits: [Option<f64>; 3],
     /// Whether these hold for the errors in service, in place of those on the log.
@@ -124,7 +126,7 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
     if of.errors.is_none() && predicted.is_none() {
         return Table::default();
     }
-    let columns = [
+    let mut columns = vec![
         "rms on the log",
         "noise",
         "rms in service",
@@ -132,6 +134,9 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         "limit",
         "pass",
     ];
+    if of.corrected.is_some() {
+        columns.insert(1, "corrected for motion");
+    }
     let mut table = Table {
         decimals: Some(2),
         ..Table::new("", &columns)
@@ -151,9 +156,14 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
         let uncertainty = service.or(rms).map(|rms| 2.0 * rms);
         let errors = [rms, noise, service, uncertainty, limit];
-        let figures = errors.map(|error| error.map_or(Figure::None, |error| micro(axis, error)));
+        let mut errors = errors.to_vec();
+        if let Some(corrected) = of.corrected {
+            errors.insert(1, Some(corrected.axes[k].rms));
+        }
+        let figures = (errors.into_iter())
+            .map(|error| error.map_or(Figure::None, |error| micro(axis, error)));
         let pass = passes.map_or(Figure::None, Figure::Is);
-        table.row(axis.name, figures.into_iter().chain([pass]));
+        table.row(axis.name, figures.chain([pass]));
     }
     table
 }
@@ -224,6 +234,7 @@ mod tests {
             is_field,
             errors: Some(&errors),
             limits: [None, Some(0.9e-6), None],
+            corrected: None,
             in_service: false,
         })
     }
