@@ -3,7 +3,7 @@
 //! | effect | physics |
 //! |---|---|
 //! | lag tau | a reading at t belongs to the pose at t - tau |
-//! | coil | a motor near each probe, along X, Y or Z, pushes [`MASS_KG`] with the acceleration there; the moment of its coil follows its force, the field is a dipole's |
+//! | coil | a motor near each probe, along X, Y or Z, pushes `MASS_KG` with the acceleration there; the moment of its coil follows its force, the field is a dipole's |
 //! | arm | the probe is a mass on three springs: x'' + 2 zeta w x' + w^2 x = -a, w = 2 pi f |
 //!
 //! Places and polarities of the coils and resonances of the arms are drawn for a stage. One motor is along

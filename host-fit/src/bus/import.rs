@@ -20,10 +20,8 @@ pub mod reference;
 pub use error::ImportError;
 
 use crate::bus::BusAddress;
-use crate::cli::arguments::between;
 use crate::output::Output;
 use bus_log::BusCounts;
-use clap::Args;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
@@ -34,49 +32,30 @@ use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
 use std::path::PathBuf;
 
-/// Arguments of `import`.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct ImportArgs {
+/// Settings of `import`.
+#[derive(Clone, Debug)]
+pub(crate) struct ImportSettings {
     /// Record of the bus, as `record`, `live --record` or `candump -L` writes it.
-    #[arg(value_name = "CANDUMP")]
     pub(crate) bus: PathBuf,
     /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
     /// columns that stage.toml names.
-    #[arg(value_name = "REFERENCE")]
     pub(crate) reference: PathBuf,
     /// The stage as designed.
-    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
     pub(crate) stage: PathBuf,
     /// Where to write the calibration log.
-    #[arg(long, value_name = "LOG.csv")]
     pub(crate) out: PathBuf,
     /// Largest time from a tick to the reference samples before and after it, us; one servo
     /// period if not given.
-    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) tolerance_us: Option<u32>,
     /// Start of the search: time of the bus less time of the reference, us. Without it, both records start
     /// together.
-    #[arg(long, value_name = "US", allow_negative_numbers = true)]
     pub(crate) offset_us: Option<f64>,
     /// How far from its start the offset is searched, s.
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 2.0,
-        value_parser = search_seconds
-    )]
     pub(crate) search_s: f64,
     /// Only frames of this interface, where the record holds several; can0@5 for the frames of node 5.
-    #[arg(long, value_name = "IFACE")]
     pub(crate) interface: Option<BusAddress>,
     /// Leave out lines that cannot be read, and count them.
-    #[arg(long)]
     pub(crate) skip_bad_lines: bool,
-}
-
-/// For records further apart than an hour, `--offset-us` gives the start.
-fn search_seconds(text: &str) -> Result<f64, String> {
-    between(text, 0.0, 3600.0, "a number of seconds")
 }
 
 /// The result of an import.
@@ -102,7 +81,7 @@ const TEXT_BYTES: usize = 1 << 16;
 /// # Errors
 /// See [`ImportError`]; nothing is written then.
 pub(crate) fn run(
-    settings: &ImportArgs,
+    settings: &ImportSettings,
     watch: Watch<'static>,
 ) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;

@@ -9,27 +9,19 @@ pub use watch::Monitor;
 
 use super::BusAddress;
 use super::live::BusError;
-use crate::cli::arguments::seconds;
-use crate::cli::key::KeyFile;
 use crate::output::OutputError;
-use clap::Args;
 use hal_adapters::can::command::Outcome;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Arguments of `record`.
-#[derive(Debug, Args)]
-pub(crate) struct RecordArgs {
+/// Settings of `record`.
+#[derive(Debug)]
+pub(crate) struct RecordSettings {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
-    #[arg(value_name = "IFACE")]
     pub(crate) can: BusAddress,
     /// Where to write the record, as `candump -L` does, for `import`: a new file.
-    #[arg(long, value_name = "BUS.log")]
     pub(crate) out: PathBuf,
-    #[command(flatten)]
-    pub(crate) key: KeyFile,
     /// End after this many seconds; without it, on Ctrl-C.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) seconds: Option<Duration>,
 }
 

@@ -1,6 +1,6 @@
 //! A fit with the decisions around it.
 
-use super::Limits;
+use super::{Limits, name_of};
 use crate::report::figure::{Group, group};
 use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
@@ -232,7 +232,7 @@ impl Outcome {
             fit,
             &order.settings,
             log_and_stage,
-            elapsed_s,
+            (name_of(&fit.fitted.loss), elapsed_s),
             judged,
         ))
     }

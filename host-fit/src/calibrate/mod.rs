@@ -6,7 +6,6 @@ mod evaluation;
 mod fitted;
 mod limit;
 mod recalibration;
-mod settings;
 
 pub(crate) use choice::values;
 pub use choice::{Choice, name_of};
@@ -14,7 +13,6 @@ pub use evaluation::{EvalOrder, Evaluation};
 pub use fitted::{CalibrateError, FitOrder, Outcome};
 pub use limit::Limits;
 pub use recalibration::Updated;
-pub use settings::{FitOptions, Mismatch};
 
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;

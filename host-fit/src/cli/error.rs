@@ -11,10 +11,11 @@
 //! Every message says what is wrong, where, and what to do. The library's errors have variants; here
 //! they end, and only their message and their status count.
 
+use super::fit_options::Mismatch;
 use super::interrupt;
 use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
-use crate::calibrate::{CalibrateError, Mismatch};
+use crate::calibrate::CalibrateError;
 use crate::output::export::ExportError;
 use crate::output::{OutputError, OutputProblem};
 use hallstage_calibration::fit::FitError;

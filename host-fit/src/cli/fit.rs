@@ -1,9 +1,10 @@
 //! `host-fit fit`.
 
 use super::arguments::{Json, Logs, Threads, choice};
+use super::fit_options::FitOptions;
 use super::interrupt;
 use super::report::finish;
-use crate::calibrate::{FitOptions, FitOrder};
+use crate::calibrate::FitOrder;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};

@@ -10,6 +10,7 @@ mod error;
 mod eval;
 mod export;
 mod fit;
+mod fit_options;
 mod identify;
 mod import;
 mod init;
@@ -29,6 +30,8 @@ mod simulate;
 mod terminal;
 mod threads;
 mod update;
+
+pub use fit_options::FitOptions;
 
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
@@ -101,7 +104,7 @@ commands! {
     /// Bring a parameter blob up to date by a few seconds of log.
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(crate::bus::import::ImportArgs) => import::run,
+    Import(import::ImportArgs) => import::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.
@@ -111,9 +114,9 @@ commands! {
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(crate::bus::live::LiveArgs) => live::run,
+    Live(live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
-    Record(crate::bus::recorder::RecordArgs) => record::run,
+    Record(record::RecordArgs) => record::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
     Identify(identify::IdentifyArgs) => identify::run,
     /// Store new parameters in a controller over a CAN bus (Linux).

@@ -1,6 +1,6 @@
 //! The posterior of a fit as a file beside its blob: the prior of a recalibration.
 //!
-//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS2` in ASCII, the fields of [`Content`] in postcard,
+//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS2` in ASCII, the fields of `Content` in postcard,
 //! and the SHA-256 of all before it.
 
 use crate::output::file::is_stream;

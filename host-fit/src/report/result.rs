@@ -6,7 +6,6 @@ use super::figure::{Figure, Group, Item, bare, figure, group};
 use super::motion::{probe_motion, valid_up_to};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
 use super::trusted::trusted;
-use crate::calibrate::name_of;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{Fit, FitSettings};
@@ -176,7 +175,7 @@ impl Report {
         fit: &Fit,
         settings: &FitSettings,
         (log, stage): (&LogReading, &Stage),
-        elapsed_s: f64,
+        (loss, elapsed_s): (&str, f64),
         (diagnosis, refusal): (&Diagnosis, Option<&Refusal>),
     ) -> Self {
         let dataset = fit.rows(&log.dataset);
@@ -237,7 +236,7 @@ impl Report {
             "evaluations" => estimate.evaluations,
             "solver_s" => json!(estimate.elapsed.as_secs_f64()),
             "stopped" => estimate.stopped.as_str(),
-            "loss" => name_of(&fit.fitted.loss),
+            "loss" => loss,
             "outlier_rows" => fit.fitted.outliers().count(),
             "standard_errors" => standard_errors,
             "correlations" => correlations,

@@ -1,7 +1,7 @@
 //! Bytes become events on a bus: mostly frames with a right check, since no fuzzer finds one.
 
-use embedded_can::{ExtendedId, Frame, StandardId};
 use crate::PARAMS;
+use embedded_can::{ExtendedId, Frame, StandardId};
 use hal_adapters::can::command::{Command, Request};
 use hal_adapters::can::e2e::{Payload, protect};
 use hal_adapters::can::table::TABLE;

@@ -9,7 +9,7 @@
 //! | [`motion`] | the motions that show a parameter |
 //! | [`draw`] | the rows that a fit draws |
 //! | [`rows`] | the rows of a log |
-//! | [`derivatives`] | acceleration from rows |
+//! | `derivatives` | acceleration from rows |
 //! | [`dynamics`] | what motion adds to the readings: lags of the probes, acceleration |
 //! | [`blocks`] | residuals and derivatives of rows, as means over a few |
 //! | [`probe`] | what a probe reads, with derivatives |

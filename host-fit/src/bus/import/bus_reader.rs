@@ -2,7 +2,7 @@
 
 use super::bus_log::{BusCounts, BusTick, Collector};
 use super::node_clock::{NodeClock, NodeRun};
-use super::{ImportArgs, ImportError};
+use super::{ImportError, ImportSettings};
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
@@ -21,7 +21,7 @@ const TICKS_MAX: usize = 3_600_000;
 /// # Errors
 /// `Log`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
 pub(super) fn read(
-    settings: &ImportArgs,
+    settings: &ImportSettings,
     stage: &Stage,
     watch: Watch<'static>,
 ) -> Result<(NodeRun, BusCounts), ImportError> {
@@ -76,7 +76,7 @@ const TICKS_MIN: usize = 125;
 
 /// A record of the bus while it is read.
 struct BusReader<'s> {
-    settings: &'s ImportArgs,
+    settings: &'s ImportSettings,
     stage: &'s Stage,
     /// Number of the current line, from 1.
     line: usize,

@@ -108,7 +108,7 @@ pub(super) fn reference_of(ticks: u32, fast: f64, pause_us: Option<f64>) -> Stri
 /// Two records and their stage in a folder, and how they are joined.
 pub(super) struct Import {
     _folder: TempDir,
-    pub(super) settings: ImportArgs,
+    pub(super) settings: ImportSettings,
 }
 
 pub(super) fn files(bus: &str, reference: &str) -> Import {
@@ -117,7 +117,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), hallstage_input::shipped::STAGE_TOML).expect("written");
-    let settings = ImportArgs {
+    let settings = ImportSettings {
         bus: path("bus.log"),
         reference: path("ifm.csv"),
         stage: path("stage.toml"),
@@ -136,7 +136,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
 
 impl Import {
     /// With another setting.
-    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportArgs)) -> Self {
+    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportSettings)) -> Self {
         change(&mut self.settings);
         self
     }

@@ -3,7 +3,7 @@
 use super::bus::now_us;
 use super::display::{Shown, say, show};
 use super::node::{Node, NodeSettings};
-use super::{Bus, BusError, LiveArgs, LiveError};
+use super::{Bus, BusError, LiveError, LiveSettings};
 use crate::bus::BusAddress;
 use crate::output::record_file::RecordFile;
 use crate::output::{OutputError, blob_file, is_standard_output};
@@ -23,7 +23,7 @@ const SEND_DEADLINE: Duration = Duration::from_millis(1);
 ///
 /// # Errors
 /// See [`LiveError`]. An interface that goes down is waited for, not an error.
-pub(crate) fn run(settings: &LiveArgs, stop: &AtomicBool) -> Result<(), LiveError> {
+pub(crate) fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError> {
     let set = blob_file::read(&settings.params)?;
     check_serial(&set, settings)?;
     let node = NodeSettings {
@@ -82,7 +82,7 @@ fn layout_of(set: &ParameterSet) -> Option<Layout> {
         .or_else(|| Layout::from_range(low.saturating_add(1), high.saturating_sub(1)))
 }
 
-fn check_serial(set: &ParameterSet, settings: &LiveArgs) -> Result<(), LiveError> {
+fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveError> {
     match &settings.serial {
         Some(serial) if set.expect_serial(serial).is_err() => Err(LiveError::OtherStage {
             path: settings.params.clone(),

@@ -1,6 +1,6 @@
 //! Asks the controller for codes, records the bus, and asks the controller to stop.
 
-use super::{MISSING_ONE_IN, Monitor, RecordArgs, Recorded, RecorderError};
+use super::{MISSING_ONE_IN, Monitor, RecordSettings, Recorded, RecorderError};
 use crate::bus::live::{Bus, BusError, now_us};
 use crate::bus::update::{Link, Talk, UpdateError};
 use crate::output::record_file::RecordFile;
@@ -27,7 +27,7 @@ const SHOWN_EVERY: Duration = Duration::from_millis(200);
 /// # Errors
 /// See [`RecorderError`]. Without codes there is no file.
 pub(crate) fn run(
-    args: &RecordArgs,
+    args: &RecordSettings,
     key: Option<Key>,
     shows: bool,
     stop: &AtomicBool,
@@ -72,7 +72,7 @@ pub(crate) fn run(
 }
 
 struct Session<'s> {
-    args: &'s RecordArgs,
+    args: &'s RecordSettings,
     key: Option<Key>,
     shows: bool,
     bus: Bus,

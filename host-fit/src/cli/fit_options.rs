@@ -1,8 +1,8 @@
 //! Which settings of a fit go together: only least squares has weights, and the field model has one way to
 //! be fitted.
 
-use super::{FitOrder, Limits};
-use crate::cli::arguments::{blob_text, choice, train};
+use super::arguments::{blob_text, choice, train};
+use crate::calibrate::{FitOrder, Limits};
 use clap::{Args, Command, FromArgMatches};
 use hallstage_calibration::fit::{FitSettings, ModelChoice};
 use hallstage_input::watch::Watch;
@@ -84,7 +84,7 @@ impl FitOptions {
     /// The fit that they ask for.
     ///
     /// # Errors
-    /// [`Mismatch`] where options do not go together.
+    /// `Mismatch` where options do not go together.
     pub fn order(&self, created: Text, watch: Watch<'static>) -> Result<FitOrder, Mismatch> {
         let usual = SolverOptions::new(self.project, self.seed);
         let options = SolverOptions {
