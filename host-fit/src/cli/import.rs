@@ -58,11 +58,11 @@ impl ImportArgs {
             reference: self.reference.clone(),
             stage: self.stage.clone(),
             out: self.out.clone(),
-            tolerance_us: self.tolerance_us.clone(),
-            offset_us: self.offset_us.clone(),
-            search_s: self.search_s.clone(),
+            tolerance_us: self.tolerance_us,
+            offset_us: self.offset_us,
+            search_s: self.search_s,
             interface: self.interface.clone(),
-            skip_bad_lines: self.skip_bad_lines.clone(),
+            skip_bad_lines: self.skip_bad_lines,
         }
     }
 }

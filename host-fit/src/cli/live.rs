@@ -52,12 +52,12 @@ impl LiveArgs {
             params: self.params.clone(),
             serial: self.serial.clone(),
             record: self.record.clone(),
-            hold: self.hold.clone(),
-            listen_only: self.listen_only.clone(),
-            duration: self.duration.clone(),
-            every: self.every.clone(),
-            assembly_us: self.assembly_us.clone(),
-            stale_us: self.stale_us.clone(),
+            hold: self.hold,
+            listen_only: self.listen_only,
+            duration: self.duration,
+            every: self.every,
+            assembly_us: self.assembly_us,
+            stale_us: self.stale_us,
         }
     }
 }

@@ -32,7 +32,7 @@ impl RecordArgs {
         RecordSettings {
             can: self.can.clone(),
             out: self.out.clone(),
-            seconds: self.seconds.clone(),
+            seconds: self.seconds,
         }
     }
 }
