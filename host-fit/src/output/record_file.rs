@@ -12,13 +12,15 @@ const UNWRITTEN_MAX: Duration = Duration::from_secs(1);
 const UNWRITTEN_BYTES: usize = 64 * 1024;
 
 /// A file that gains lines, each within a second. An existing file is never replaced. A device, a pipe and
-/// standard output (`-`) are written to directly. Where a write fails, the last line may be cut; readers leave it out.
+/// standard output (`-`) are written to directly. Where a write fails, the file keeps the lines before.
 #[derive(Debug)]
 pub struct RecordFile {
     output: Output,
     /// Lines that are not yet in the file.
     unwritten: Vec<u8>,
     since: Instant,
+    /// Bytes of whole lines in the file.
+    whole: u64,
 }
 
 impl RecordFile {
@@ -31,6 +33,7 @@ impl RecordFile {
             output: Output::create_new(path)?,
             unwritten: Vec::with_capacity(UNWRITTEN_BYTES),
             since: Instant::now(),
+            whole: 0,
         })
     }
 
@@ -67,6 +70,10 @@ impl RecordFile {
     /// [`OutputError`]; write no more lines then.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         let written = self.output.write(&self.unwritten);
+        match written {
+            Ok(()) => self.whole += self.unwritten.len() as u64,
+            Err(_) => self.output.cut_to_lines(self.whole, &self.unwritten),
+        }
         self.unwritten.clear();
         written
     }

@@ -27,10 +27,9 @@ pub(super) fn probe_motion(fit: &Fit) -> Group {
     let added = added.zip(errors.as_flattened());
     let added =
         added.map(|(value, error)| figure(value * 1e3, "um/(m/s2)").with_error(Some(error * 1e3)));
-    let correction = motion.correction(&fit.estimate.parameters);
-    let rows = |m: &nalgebra::Matrix3<f64>| json!(runtime::matrix::to_rows(m));
-    let correction =
-        correction.map(|[a, l]| json!({ "acceleration_s2": rows(&a), "velocity_s": rows(&l) }));
+    let correction = fit.set.motion_correction.map(|correction| {
+        json!({ "acceleration_s2": correction.acceleration_s2, "velocity_s": correction.velocity_s })
+    });
     group! {
         "lag" => Figure::List(lags.collect()),
         "by_acceleration" => motion.is_determined.then(|| Figure::List(added.collect())),

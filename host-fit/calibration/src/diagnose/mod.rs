@@ -52,9 +52,11 @@ use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused, severity};
 use faults::{Calibrated, Faults, find_faults};
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::FieldParameters;
 pub use limits::ERROR_TO_NOISE_MAX;
@@ -137,10 +139,7 @@ pub fn diagnose_log(
     };
     out.motion = fitted.ok().and_then(|fit| {
         let (motion, parameters) = (&fit.estimate.motion, &fit.estimate.parameters);
-        let motion = match out.shows_probe_lags() {
-            true => *motion,
-            false => motion.without_probe_lags(),
-        };
+        let motion = out.probes_in_motion(motion);
         InMotion::new(&motion, parameters, stage, out.predicted.as_ref()?)
     });
     if let (Some(motion), Some(at_rest)) = (out.motion, out.predicted) {
@@ -271,18 +270,23 @@ impl Diagnosis {
         self.findings.extend(of.findings);
     }
 
-    /// Whether the lags of the probes in the fit are lags of the probes: no beam is late, and no other fault bent the
-    /// fit.
-    fn shows_probe_lags(&self) -> bool {
-        let late = |found: &&Finding| found.code() == Code::ReferenceLag;
-        let mut late = self
-            .findings
-            .iter()
-            .filter(late)
-            .flat_map(Finding::channels);
-        match late.next() {
-            Some(channel) => !channel.is_beam(),
-            None => self.repair.is_none(),
+    /// The probes in motion, by a fit: as the repair has them, and without the lags where a beam is late.
+    fn probes_in_motion(&self, fitted: &MotionFit) -> MotionFit {
+        let is_late_beam = |found: &Finding| {
+            let beams = [Channel::BeamX, Channel::BeamY1, Channel::BeamY2];
+            found.code() == Code::ReferenceLag
+                && found
+                    .channels()
+                    .iter()
+                    .any(|channel| beams.contains(channel))
+        };
+        match &self.repair {
+            Some(repair) => MotionFit {
+                probe_lag_covariance: fitted.probe_lag_covariance,
+                ..repair.motion
+            },
+            None if self.findings.iter().any(is_late_beam) => fitted.with_other_lags([0.0; 3]),
+            None => *fitted,
         }
     }
 
@@ -362,7 +366,7 @@ pub fn diagnose_blob(
         },
         is_for_service,
         is_fitted: false,
-        shows_acceleration: false,
+        shows_acceleration: set.motion_correction.is_some(),
     };
     let mut out = Diagnosis::default();
     out.add_faults(dataset, dataset, stage, (by, 0.0), true);

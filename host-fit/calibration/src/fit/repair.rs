@@ -4,6 +4,7 @@ use super::{Estimate, Fit, FitError};
 use crate::judge::predicted::Predicted;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use nalgebra::DMatrix;
 
@@ -14,6 +15,8 @@ pub struct Repair {
     pub parameters: FieldParameters,
     /// Their covariance, in their order and units.
     pub covariance: DMatrix<f64>,
+    /// Lags of the probes, and what acceleration adds to their readings.
+    pub motion: MotionFit,
 }
 
 impl Fit {

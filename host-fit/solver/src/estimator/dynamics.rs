@@ -104,7 +104,7 @@ impl MotionFit {
     }
 
     /// From the values and the covariance of a fit of the field model.
-    pub(super) fn new(values: &[f64], covariance: &DMatrix<f64>, is_determined: bool) -> Self {
+    pub fn new(values: &[f64], covariance: &DMatrix<f64>, is_determined: bool) -> Self {
         let lags = covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS);
         let of_axis =
             |axis: usize| Matrix3::from_fn(|i, k| covariance[(place(i, axis), place(k, axis))]);
@@ -139,11 +139,11 @@ impl MotionFit {
         })
     }
 
-    /// The same with probes that are read at one time.
+    /// The same with other lags of the probes, s, as well known; they count from their mean.
     #[must_use]
-    pub fn without_probe_lags(mut self) -> Self {
-        self.dynamics.probe_lag_s = [0.0; 3];
-        self.probe_lag_covariance = Matrix3::zeros();
+    pub fn with_other_lags(mut self, lag_s: [f64; 3]) -> Self {
+        let mean_s = lag_s.iter().sum::<f64>() / 3.0;
+        self.dynamics.probe_lag_s = lag_s.map(|lag_s| lag_s - mean_s);
         self
     }
 

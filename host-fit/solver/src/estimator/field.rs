@@ -243,11 +243,8 @@ impl WhiteFit {
             value_s: self.at.values[LAG],
             standard_error_s: covariance[(LAG, LAG)].sqrt(),
         };
-        let motion = MotionFit::new(
-            self.at.values.as_slice(),
-            &covariance,
-            self.shows_acceleration,
-        );
+        let is_determined = self.shows_acceleration && MotionFit::determines(&covariance);
+        let motion = MotionFit::new(self.at.values.as_slice(), &covariance, is_determined);
         let (posterior, temperature) = self.with_temperature(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.

@@ -4,7 +4,7 @@
 //! holds their information on the parameters, and is a tenth of the work for all that follows. The
 //! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
-use super::derivatives::{SIDE, second_derivatives};
+use super::derivatives::{SAMPLES, SIDE_US, second_derivatives};
 use super::dynamics::{ARM_M, Dynamics};
 use crate::estimator::robust::HALF;
 use hallstage_input::dataset::{Dataset, Row};
@@ -287,20 +287,23 @@ fn speed(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
     std::array::from_fn(change)
 }
 
-/// Acceleration of X, Y, Rz, Z, Rx, Ry at a row, SI; near an end of a movement that of the nearest row with a whole window, and zero
-/// where many rows are missing.
+/// Acceleration of X, Y, Rz, Z, Rx, Ry at a row, SI; near an end of a movement that of the nearest row with a whole
+/// window, and zero where many rows are missing.
 fn acceleration(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
-    let movement = &dataset.movements[dataset.rows[index].movement].rows;
-    let middle = index
-        .min(movement.end.saturating_sub(SIDE + 1))
-        .max(movement.start + SIDE);
-    if middle >= movement.end {
+    let movement = dataset.movements[dataset.rows[index].movement].rows.clone();
+    let rows = &dataset.rows[movement.clone()];
+    let [Some(first), Some(last)] = [rows.first(), rows.last()] else {
         return [0.0; 6];
-    }
-    let window = middle - SIDE..(middle + SIDE + 1).min(movement.end);
-    let used = window.filter(|&k| trusted[k]).map(|k| &dataset.rows[k]);
-    let time_s = |row: &Row| (row.t_us - dataset.rows[middle].t_us) as f64 * 1e-6;
-    second_derivatives(used.map(|row| (time_s(row), pose(row)))).unwrap_or([0.0; 6])
+    };
+    let from_us = first.t_us + SIDE_US;
+    let middle_us = (dataset.rows[index].t_us).clamp(from_us, from_us.max(last.t_us - SIDE_US));
+    let start = rows.partition_point(|row| row.t_us < middle_us - SIDE_US);
+    let count = rows[start..].partition_point(|row| row.t_us <= middle_us + SIDE_US);
+    let used = (start..start + count)
+        .step_by(count.div_ceil(SAMPLES[0]).max(1))
+        .filter(|k| trusted[movement.start + k]);
+    let sample = |k: usize| ((rows[k].t_us - middle_us) as f64 * 1e-6, pose(&rows[k]));
+    second_derivatives(used.map(sample)).unwrap_or([0.0; 6])
 }
 
 /// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI.

@@ -15,7 +15,7 @@ use crate::estimator::gauss_newton::{Equations, Normal, Point};
 use crate::estimator::model::ParameterId;
 use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
 /// Unknowns: the parameters and the lags.
@@ -239,16 +239,18 @@ impl Sums {
         let lags = [PROBE_LAGS, PROBE_LAGS + 1];
         let with_lags: Vec<usize> = free.iter().copied().chain([LAG]).chain(lags).collect();
         let errors = self.errors(&with_lags);
-        if lags.iter().any(|&k| errors.standard_error(k).is_none()) {
+        let found = lags.map(|k| errors.standard_error(k));
+        let ([Some(a), Some(b)], true) = (found, self.clusters > with_lags.len()) else {
             return MotionFit::unknown();
-        }
+        };
         let descent = Column::from_fn(|k, _| self.normal.descent(k));
-        let covariance = errors.inverse * self.clustered * errors.inverse;
+        let clustered = errors.inverse * self.clustered * errors.inverse;
+        let clustered = clustered.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS);
+        // With the standard errors on its diagonal.
+        let scale = [a / clustered[(0, 0)].sqrt(), b / clustered[(1, 1)].sqrt()];
+        let covariance = Matrix2::from_fn(|i, k| clustered[(i, k)] * scale[i] * scale[k]);
         let values = lags.map(|k| (errors.inverse.row(k) * descent)[0]);
-        MotionFit::with_probe_lags(
-            values,
-            covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS).into(),
-        )
+        MotionFit::with_probe_lags(values, covariance)
     }
 
     /// The lag with all parameters that are fitted.

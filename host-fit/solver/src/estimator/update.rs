@@ -3,9 +3,10 @@
 //! The prior is normal about the old parameters. Its covariance is the old posterior's plus what
 //! may have changed since, written as L L': the parameters are p = p_old + L x with x standard
 //! normal. This needs no inverse, so a change may be of one parameter or of all, with or without
-//! an old posterior. The lags of the reference and of the probes are unknowns of every log.
+//! an old posterior. The lags of the reference and of the probes, and what
+//! acceleration adds, are unknowns of every log.
 
-use super::dynamics::{Dynamics, PROBE_LAG_S};
+use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION, PROBE_LAG_S};
 use super::error::FieldFitError;
 use super::noise::white_mm;
 use super::parameters::FieldParameters;
@@ -14,8 +15,8 @@ use super::probe::probes;
 use super::rows::Rows;
 use super::temperature::OF_SENSORS;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
-use super::whiten::{COLUMNS, FieldEquations, LAG, Noise, PROBE_LAGS, UNKNOWNS};
-use crate::estimator::gauss_newton::{self, Limits, Solved, Unknowns};
+use super::whiten::{ACCELERATIONS, COLUMNS, FieldEquations, LAG, Noise, PROBE_LAGS, UNKNOWNS};
+use crate::estimator::gauss_newton::{self, Equations, Limits, Normal, Point, Solved, Unknowns};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -48,8 +49,8 @@ const SLOPE: f64 = 0.05;
 const PLACE_M: f64 = 5e-3;
 const OF_PRIOR: f64 = 0.2;
 const LAG_S: f64 = 0.01;
-/// Columns of the lags of the reference and of two probes.
-const LAGS: usize = 3;
+/// Columns of the lags of the reference and of two probes, and of what acceleration adds.
+const OF_MOTION: usize = 3 + UNKNOWNS - ACCELERATIONS;
 
 impl Change {
     /// The columns of L for it, each over the parameters.
@@ -179,20 +180,33 @@ pub fn update(
     let mut origin = DVector::zeros(UNKNOWNS);
     origin.as_mut_slice()[..COUNT].copy_from_slice(old.probes.as_flattened());
     let changes = basis.ncols();
-    let unknowns = Unknowns {
+    let mut unknowns = Unknowns {
         origin,
         basis,
         prior: DMatrix::identity(changes, changes),
         ranges: Vec::new(),
     };
     let x = DVector::zeros(changes);
+    // As in a fit: what acceleration adds is an unknown where the log determines it.
+    let at = Point {
+        values: unknowns.origin.clone(),
+        offsets: offsets_mm.clone(),
+    };
+    let expected =
+        (equations.normal(&at)).and_then(|normal: Normal<COLUMNS>| unknowns.covariance(&normal));
+    if !expected.is_some_and(|all| MotionFit::determines(&all)) {
+        unknowns
+            .basis
+            .rows_mut(ACCELERATIONS, UNKNOWNS - ACCELERATIONS)
+            .fill(0.0);
+    }
     let solved: Option<Solved<COLUMNS>> =
         gauss_newton::solve(&equations, &unknowns, x, offsets_mm, Limits::CLOSE);
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {
-        // The errors of the temperatures belong to this log only. Their column is the last before the lags.
-        lasting.column_mut(changes - LAGS - 1).fill(0.0);
+        // The errors of the temperatures belong to this log only. Their column is the last before the columns of motion.
+        lasting.column_mut(changes - OF_MOTION - 1).fill(0.0);
     }
     let inverse = unknowns
         .factor(&solved.normal)
@@ -228,7 +242,7 @@ fn factor(
 ) -> Option<DMatrix<f64>> {
     let changes = change.columns(old);
     let known = covariance.map_or(0, DMatrix::nrows);
-    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + LAGS);
+    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + OF_MOTION);
     if let Some(covariance) = covariance {
         // Scaled to a diagonal of ones: the units differ by orders of magnitude.
         let scale = covariance.diagonal().map(f64::sqrt);
@@ -250,5 +264,8 @@ fn factor(
     let lags = known + changes.len();
     l[(LAG, lags)] = LAG_S;
     (l[(PROBE_LAGS, lags + 1)], l[(PROBE_LAGS + 1, lags + 2)]) = (PROBE_LAG_S, PROBE_LAG_S);
+    for k in ACCELERATIONS..UNKNOWNS {
+        l[(k, lags + 3 + k - ACCELERATIONS)] = PER_ACCELERATION;
+    }
     Some(l)
 }

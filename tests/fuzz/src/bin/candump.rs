@@ -18,5 +18,5 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
 fuzz_target!(|record: &[u8]| {
     FOLDER.write("bus", record);
     FOLDER.import(&[]);
-    FOLDER.import(&["--skip-bad-lines", "--layout", "24"]);
+    FOLDER.import(&["--skip-bad-lines"]);
 });

@@ -73,6 +73,12 @@ impl Suspect {
         }
     }
 
+    /// The Hall probe, 0 to 2, where its time is suspected.
+    pub(super) fn late_probe(&self) -> Option<usize> {
+        let is_late = self.quantity == Quantity::Time && self.is_single() && self.first < 3;
+        is_late.then_some(self.first)
+    }
+
     /// The channel or the group.
     pub(super) const fn channel(&self) -> Channel {
         match self.is_single() {

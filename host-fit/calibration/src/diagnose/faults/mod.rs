@@ -29,6 +29,7 @@ use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Quantity, Severity};
 use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::gauss_newton::Factor;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
@@ -273,7 +274,7 @@ impl Finder<'_> {
         let is_felt = |cost: f64| severity(cost) > Severity::Note;
         let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), self.calibrated.is_fitted);
         let (mut findings, mut channels) = (Vec::new(), Vec::new());
-        let mut lags_s = self.lags_s;
+        let (mut lags_s, mut probe_lags_s) = (self.lags_s, [0.0; 3]);
         for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
             let off = bent.solve(&(estimate.gradient(number) * *size));
             let (known, off) = (DMatrix::zeros(COUNT, COUNT), &off.as_slice()[..COUNT]);
@@ -285,6 +286,9 @@ impl Finder<'_> {
                 let is_laser = suspect.quantity == Quantity::Gain && suspect.is_beam();
                 is_clear &= fault.alike.is_empty() && !is_laser;
                 channels.push(suspect.channel());
+            }
+            if let Some(probe) = fault.suspect.late_probe() {
+                probe_lags_s[probe] += 1e-3 * size;
             }
             // The lag of a beam that was taken off because of another fault comes back.
             let back = (0..3).find(|&beam| {
@@ -317,6 +321,12 @@ impl Finder<'_> {
         let repair = Repair {
             parameters: estimate.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
+            motion: MotionFit::new(
+                estimate.values().as_slice(),
+                &covariance,
+                self.calibrated.shows_acceleration,
+            )
+            .with_other_lags(probe_lags_s),
         };
         Some(Faults {
             findings,
