@@ -47,5 +47,6 @@ pub fn up_to(motion: &InMotion) -> String {
         true => "",
         false => "; the log does not show the effect of more acceleration",
     };
-    format!("good up to {acceleration:.2} m/s² and {speed:.0} mm/s rms{open}")
+    let digits = usize::from(speed < 10.0);
+    format!("good up to {acceleration:.2} m/s² and {speed:.digits$} mm/s rms{open}")
 }
