@@ -90,16 +90,18 @@ impl Output {
         written.map_err(|source| self.failed(source))
     }
 
-    /// Leaves whole lines alone in a new file at the target that holds `whole` bytes of them and a part of `lines`; a
-    /// device keeps what it has.
-    pub(super) fn cut_to_lines(&self, whole: u64, lines: &[u8]) {
+    /// Leaves whole lines alone in a new file at the target that holds `whole` bytes of them and a part of `lines`, and
+    /// returns their bytes; a device keeps what it has.
+    pub(super) fn cut_to_lines(&self, mut whole: u64, lines: &[u8]) -> u64 {
         if let Sink::Placed(file) = &self.sink
             && let Ok(found) = file.metadata()
         {
             let part = (found.len().saturating_sub(whole) as usize).min(lines.len());
             let kept = lines[..part].iter().rposition(|byte| *byte == b'\n');
-            let _ = file.set_len(whole + kept.map_or(0, |last| last as u64 + 1));
+            whole += kept.map_or(0, |last| last as u64 + 1);
+            let _ = file.set_len(whole);
         }
+        whole
     }
 
     /// Rewrites the first bytes of a [file](Self::is_file). These must be its last bytes.

@@ -72,7 +72,7 @@ impl RecordFile {
         let written = self.output.write(&self.unwritten);
         match written {
             Ok(()) => self.whole += self.unwritten.len() as u64,
-            Err(_) => self.output.cut_to_lines(self.whole, &self.unwritten),
+            Err(_) => self.whole = self.output.cut_to_lines(self.whole, &self.unwritten),
         }
         self.unwritten.clear();
         written
