@@ -14,23 +14,30 @@ pub const SAMPLES: [usize; 2] = [21, 9];
 pub fn second_derivatives<const N: usize>(
     samples: impl Iterator<Item = (f64, [f64; N])> + Clone,
 ) -> Option<[f64; N]> {
-    let half_s = (samples.clone()).fold(0.0, |most, (t_s, _)| f64::max(most, t_s.abs()));
-    if samples.clone().count() < SAMPLES[1] {
+    let times_s = samples.clone().map(|(t_s, _)| t_s);
+    let half_s = (times_s.clone()).fold(0.0, |most, t_s| f64::max(most, t_s.abs()));
+    let mut moments = [0.0; 9];
+    for t_s in times_s {
+        let mut power = 1.0;
+        for moment in &mut moments {
+            *moment += power;
+            power *= t_s / half_s;
+        }
+    }
+    if moments[0] < SAMPLES[1] as f64 {
         return None;
     }
-    let powers =
-        |t_s: f64| SVector::<f64, 5>::from_fn(|k, _| (0..k).fold(1.0, |p, _| p * (t_s / half_s)));
-    let mut squares = SMatrix::<f64, 5, 5>::zeros();
-    for (t_s, _) in samples.clone() {
-        squares.ger(1.0, &powers(t_s), &powers(t_s), 1.0);
-    }
+    let squares = SMatrix::<f64, 5, 5>::from_fn(|i, k| moments[i + k]);
     let mut of_square = SVector::<f64, 5>::zeros();
     of_square[2] = 2.0 / (half_s * half_s);
-    let by_power = squares.cholesky()?.solve(&of_square);
+    let c = squares.cholesky()?.solve(&of_square);
     let mut sum = [0.0; N];
     for (t_s, values) in samples {
-        let weight = by_power.dot(&powers(t_s));
-        (sum.iter_mut().zip(values)).for_each(|(sum, x)| *sum += weight * x);
+        let t = t_s / half_s;
+        let weight = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * c[4])));
+        for (sum, x) in sum.iter_mut().zip(values) {
+            *sum += weight * x;
+        }
     }
     Some(sum)
 }
