@@ -1,4 +1,4 @@
-//! The errors that speed and acceleration add in service, and up to which motion a calibration is good.
+//! The errors that speed and acceleration add in service, and the largest motion with good errors.
 
 use super::predicted::Predicted;
 use super::verdict::GOOD_MAX;
@@ -7,10 +7,10 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::dynamics::{ARM_M, MotionFit, ServiceMotion};
 use hallstage_solver::estimator::parameters::FieldParameters;
 
-/// The errors in the motion that `[motion]` declares for service, and the motion that leaves them good.
+/// The errors in the motion that `[motion]` declares for service, and the largest motion with good errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InMotion {
-    /// Variances that motion adds to X, Y, Rz as far as the log shows it: m2, m2, rad2.
+    /// Variances that motion adds to X, Y, Rz, by the effects that the log determines: m2, m2, rad2.
     pub added: [f64; 3],
     /// The worst axis over the noise floor, with what the log does not show as large as is usual.
     pub ratio: f64,

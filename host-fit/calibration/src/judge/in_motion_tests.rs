@@ -4,52 +4,29 @@ use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};
 use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
+use crate::plan::run::PlannedRun;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::Code;
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::dynamics::Dynamics;
-use hallstage_simulate::pose::StagePose;
 use hallstage_simulate::protocol::{Protocol, Run};
 use hallstage_simulate::recording::record_stage;
 use hallstage_solver::estimator::rows::planar_motion;
-use std::f64::consts::TAU;
 
 const SEED: u64 = 7;
 
-/// Two sines an axis, smooth at both ends: amplitudes in um and urad, cycles in 30 s.
-fn two_tones(period_s: f64) -> Run {
-    const SLOW: [(f64, f64); 6] = [
-        (460e-6, 5.0),
-        (760e-6, 8.0),
-        (380e-6, 6.0),
-        (210e-6, 7.0),
-        (380e-6, 4.0),
-        (380e-6, 3.0),
-    ];
-    const FAST: [(f64, f64); 6] = [
-        (40e-6, 219.0),
-        (40e-6, 243.0),
-        (120e-6, 276.0),
-        (30e-6, 183.0),
-        (100e-6, 231.0),
-        (100e-6, 261.0),
-    ];
-    let seconds = 30.0;
-    let pose = |row: usize| {
-        let t_s = row as f64 * period_s;
-        let x = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
-        let taper = x * x * x * (10.0 - x * (15.0 - 6.0 * x));
-        let tone = |(size, cycles): (f64, f64), phase: f64| {
-            size * libm::sin(TAU * cycles * t_s / seconds + phase)
-        };
-        let axis = |k: usize| {
-            let both = tone(SLOW[k], 1.7 * k as f64) + tone(FAST[k], 1.7 * (5 - k) as f64);
-            taper * both
-        };
-        StagePose::from_array(std::array::from_fn(axis))
+/// A run of two tones, over the whole range of service.
+fn two_tones(stage: &Stage) -> Run {
+    let run = PlannedRun {
+        seconds: 30.0,
+        taper_s: 0.5,
+        amplitudes: stage.motion.axes.map(|axis| axis.service),
+        cycles: [5.0, 8.0, 6.0, 7.0, 4.0, 3.0],
+        tones: [0.0; 6],
     };
-    Run::planned((0..=(seconds / period_s) as usize).map(pose).collect())
+    let run = run.with_tones(&stage.motion);
+    Run::planned(run.trajectory(stage.servo_period_s))
 }
 
 /// A stage with these effects, with the motion of its fast moves declared for service: fit, diagnosis and the log of
@@ -61,7 +38,7 @@ fn calibrated(dynamics: Dynamics) -> (Stage, Fit, Diagnosis, Dataset) {
         let recording = record_stage(&stage, run, None, dynamics, SEED).expect("clear");
         recording.dataset(&stage).expect("a triangle")
     };
-    let run = log(two_tones(period_s));
+    let run = log(two_tones(&stage));
     let fast = log(Protocol::Fast.run(period_s, SEED));
     let motion = planar_motion(&fast);
     let rms = |derivative: usize, axis: usize| {
