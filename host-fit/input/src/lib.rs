@@ -17,6 +17,7 @@
 pub mod axis;
 mod binary;
 pub mod channel;
+pub mod channels;
 pub mod dataset;
 pub mod draft;
 mod encoding;

@@ -1,0 +1,21 @@
+//! White noise from fifth differences: motion up to some hertz is far below the noise there.
+
+use super::signal::Signal;
+use crate::statistics::median;
+
+/// Standard deviation of normal noise over the median of its magnitude.
+const NORMAL: f64 = 1.4826;
+/// Variance of the fifth differences of white noise of variance one.
+const POWER: f64 = 252.0;
+
+/// Fifth differences of a run.
+pub(super) fn fifth_differences(run: &[f64]) -> impl Iterator<Item = f64> {
+    run.windows(6)
+        .map(|v| (v[5] - v[0]) - 5.0 * (v[4] - v[1]) + 10.0 * (v[3] - v[2]))
+}
+
+/// The standard deviation of the white noise, in the unit of the values.
+pub(super) fn white(signal: &Signal) -> Option<f64> {
+    let differences = signal.runs().flat_map(fifth_differences).map(f64::abs);
+    Some(NORMAL * median(&mut differences.collect::<Vec<f64>>())? / POWER.sqrt())
+}

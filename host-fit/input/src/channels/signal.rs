@@ -1,0 +1,87 @@
+//! The values of one channel, in runs of consecutive rows.
+
+use crate::channel::Channel;
+use crate::dataset::{Dataset, LogSource, Row};
+use crate::stage::Stage;
+use std::ops::Range;
+
+/// Rows are consecutive if the time between them is below this many median times.
+const GAP_PERIODS: f64 = 1.5;
+
+/// One channel of one log.
+pub(super) struct Signal<'a> {
+    pub(super) channel: Channel,
+    /// The values by row: codes, and picometres for beams.
+    pub(super) values: Vec<f64>,
+    /// The unit of the values, m.
+    pub(super) unit_m: f64,
+    /// Runs of consecutive rows of one movement.
+    pub(super) runs: &'a [Range<usize>],
+}
+
+impl Signal<'_> {
+    /// The values of each run.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &[f64]> {
+        self.runs.iter().map(|run| &self.values[run.clone()])
+    }
+}
+
+/// The runs of consecutive rows of one movement. Rows are numbered from the first of the log.
+pub(super) fn runs(dataset: &Dataset, log: &LogSource) -> Vec<Range<usize>> {
+    let rows = &dataset.rows[log.rows.clone()];
+    let gap_us = GAP_PERIODS * 1e6 * dataset.period_s(log.rows.clone()).unwrap_or(f64::INFINITY);
+    let follows =
+        |a: &Row, b: &Row| a.movement == b.movement && ((b.t_us - a.t_us) as f64) < gap_us;
+    let mut start = 0;
+    let runs = rows.chunk_by(follows).map(|run| {
+        start += run.len();
+        start - run.len()..start
+    });
+    runs.collect()
+}
+
+/// The channels of a log: beams only if it has a reference, gaps only if it has codes.
+pub(super) fn signals<'a>(
+    dataset: &Dataset,
+    stage: &Stage,
+    log: &LogSource,
+    runs: &'a [Range<usize>],
+) -> Vec<Signal<'a>> {
+    let rows = &dataset.rows[log.rows.clone()];
+    let has_gaps = rows.iter().all(|row| row.frame.capacitive().is_some());
+    let beam_pm = |row: &Row, beam: usize| {
+        let [x, y, rz] = row.reference;
+        let turned_m = 0.5 * stage.y_baseline_m * rz.tan();
+        // Whole picometres: rounding on the way to a pose and back is far less.
+        (1e12 * [x, y + turned_m, y - turned_m][beam]).round()
+    };
+    let signal = |k: usize| {
+        let (value, unit_m): (&dyn Fn(&Row) -> f64, f64) = match k {
+            0..3 => (
+                &|row| f64::from(row.frame.hall()[k]),
+                stage.hall.m_per_count,
+            ),
+            3..6 => (&|row| beam_pm(row, k - 3), 1e-12),
+            _ => (
+                &|row| {
+                    row.frame
+                        .capacitive()
+                        .map_or(0.0, |codes| f64::from(codes[k - 6]))
+                },
+                stage.capacitive.m_per_count,
+            ),
+        };
+        Signal {
+            channel: Channel::SINGLE[k],
+            values: rows.iter().map(value).collect(),
+            unit_m,
+            runs,
+        }
+    };
+    let is_there = |k: &usize| match k {
+        0..3 => true,
+        3..6 => log.has_reference,
+        _ => has_gaps,
+    };
+    (0..9).filter(is_there).map(signal).collect()
+}
