@@ -6,7 +6,7 @@
 
 use host_fit::calibration::diagnose::diagnose_log;
 use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
-use host_fit::calibration::words::message;
+use host_fit::calibration::words::{message, model_reason};
 use host_fit::input::finding::Severity;
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage;
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let settings = FitSettings::new(ModelChoice::Auto);
     let fit = fit(&dataset, &stage, &settings)?;
-    println!("{}: {}", fit.model.title(), fit.model_reason);
+    println!("{}: {}", fit.model.title(), model_reason(&fit));
     for (axis, unit, error) in [("X", "um", 0), ("Y", "um", 1), ("Rz", "urad", 2)]
         .map(|(axis, unit, k)| (axis, unit, fit.judgement.errors.axes[k]))
     {

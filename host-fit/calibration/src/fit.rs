@@ -48,6 +48,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::field::FieldFigures;
 use hallstage_solver::estimator::model::Model;
+use hallstage_solver::estimator::service::Comparison;
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, Text};
 use runtime::{Calibration, ParameterSet};
@@ -57,8 +58,8 @@ use runtime::{Calibration, ParameterSet};
 pub struct Fit {
     /// The model.
     pub model: &'static Model,
-    /// Why this model, in a line.
-    pub model_reason: String,
+    /// Why this model.
+    pub model_reason: ModelReason,
     /// The parameters, and how well the log determines them.
     pub estimate: Estimate,
     /// What else a fit of the field model found.
@@ -76,6 +77,19 @@ pub struct Fit {
     pub decoded: Decoded,
     /// Over these rows; zero deviations refitted where the model has them.
     pub judgement: Judgement,
+}
+
+/// Why a fit is of its model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ModelReason {
+    /// The settings name it.
+    Asked,
+    /// The solver is for models of the paper only.
+    OtherSolver,
+    /// The errors of the field model in service against those of Model (31).
+    Compared(Comparison),
+    /// The field model cannot be fitted.
+    NoField(FitError),
 }
 
 /// Fits, checks and judges. A clear lag of the reference is taken off: see [`Fit::later`].
@@ -119,7 +133,7 @@ impl Fit {
         set.fit = judgement.record(train_rows);
         Ok(Self {
             model,
-            model_reason: String::new(),
+            model_reason: ModelReason::Asked,
             estimate,
             field: None,
             fitted,

@@ -113,26 +113,15 @@ pub struct Recalibration {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecalibrateError {
     /// The blob is not of the field model.
-    #[error(
-        "the blob is of {model}, and only the field model knows what it has to expect: fit again, with --model field"
-    )]
     OtherModel {
         /// What it is of.
         model: String,
     },
     /// `all` and `temperature` need the old posterior.
-    #[error("without the old posterior nothing but gains can be found: fit again")]
     NothingKnown,
     /// A log without temperatures that the blob needs, or `temperature` of a blob without them.
-    #[error(
-        "{0} has no temperatures: name their columns in [temperature] of the stage file, and fit a cold and a warm log together"
-    )]
     NoTemperature(&'static str),
     /// The log does not determine the change well enough.
-    #[error(
-        "this log does not tell {}: it leaves errors of {:.2} / {:.2} / {:.2} times the noise floor in X / Y / Rz in \
-         service. Record {}", assumed(*change), ratios[0], ratios[1], ratios[2], recording(*change)
-    )]
     NotCarried {
         /// What was to be found.
         change: Change,
@@ -140,10 +129,6 @@ pub enum RecalibrateError {
         ratios: [f64; 3],
     },
     /// The log shows another change.
-    #[error(
-        "{} does not describe this log: its residuals are {ratio:.1} times what noise makes them (chi-square, limit \
-         {limit:.2}). {}", assumed(*change), remedy(*change)
-    )]
     NotDescribed {
         /// What was to be found.
         change: Change,
@@ -153,11 +138,6 @@ pub enum RecalibrateError {
         limit: f64,
     },
     /// The parameters would have to change further than any probe drifts.
-    #[error(
-        "{} would be one beyond all that probes drift or are moved by (sum of squares {prior:.0} against what the prior \
-         allows for, limit {limit:.0}): check that the log is of this stage, and its columns, order and signs; or fit again",
-        assumed(*change)
-    )]
     TooFar {
         /// What was to be found.
         change: Change,
@@ -167,47 +147,9 @@ pub enum RecalibrateError {
         limit: f64,
     },
     /// The equations can't be solved.
-    #[error(transparent)]
     Unsolved(#[from] FieldFitError),
     /// The new parameters cannot serve a decoder.
-    #[error("the new parameters cannot be used: {0}. Check the log and the stage file")]
     Unusable(ParameterError),
-}
-
-const fn assumed(change: Change) -> &'static str {
-    match change {
-        Change::Gain => "one gain for all probes",
-        Change::Gains => "a gain for each probe",
-        Change::All => "a change of all parameters",
-        Change::Temperature => "a change of temperature alone",
-    }
-}
-
-const fn recording(change: Change) -> &'static str {
-    match change {
-        Change::Gain => "a sine along Y at service amplitude, 2 s",
-        Change::Gains => {
-            "X, Y and Rz moving at once, each at a frequency of its own, 2 s; or try --what gain"
-        }
-        Change::All | Change::Temperature => {
-            "all six axes moving at once at service amplitude, each at a frequency of its own (host-fit plan --seconds 8); \
-             or try --what gains"
-        }
-    }
-}
-
-const fn remedy(change: Change) -> &'static str {
-    match change {
-        Change::Gain => {
-            "Is it the blob of this stage? If it is, try --what gains; if a probe was moved, --what all"
-        }
-        Change::Gains | Change::Temperature => {
-            "Is it the blob of this stage? If it is, something else has changed as well: try --what all"
-        }
-        Change::All => {
-            "Is it the blob of this stage? If it is, check the columns, signs and scales of the log, or fit again"
-        }
-    }
 }
 
 /// Brings `old` up to date by a log. `created` is for the new blob, which keeps the serial number

@@ -1,12 +1,15 @@
-//! The sentences: every finding, verdict and refusal becomes words here, for terminals, pages, JSON and Python alike.
+//! The sentences: every finding, verdict, refusal and error becomes words here, for terminals, pages, JSON and Python alike.
 
 mod causes;
 mod evidence;
 mod finding;
+mod fit;
 mod refusal;
+mod run;
 mod verdict;
 
 pub use finding::message;
+pub use fit::{model_reason, search_stopped, stopped};
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
 pub use verdict::{up_to, verdict};
 

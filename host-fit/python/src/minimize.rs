@@ -2,6 +2,7 @@
 
 use crate::arrays::{reals, slice, table};
 use crate::error::wrong;
+use host_fit::calibration::words::search_stopped;
 use host_fit::input::stage::Range;
 use host_fit::input::watch::Watch;
 use host_fit::solver::solve::search::cost::{CostFunction, Individual};
@@ -193,7 +194,7 @@ pub fn minimize<'py>(
     if let Some(error) = function.error.into_inner() {
         return Err(error);
     }
-    let mut message = found.reason.to_string();
+    let mut message = search_stopped(found.reason).to_owned();
     if found.nan_costs > 0 {
         message += &format!(
             "; {} of {} values were NaN",

@@ -32,7 +32,7 @@ pub struct FitOrder {
 pub enum CalibrateError {
     /// No fit was tried: the settings do not go together.
     #[error(transparent)]
-    Unsupported(SolveError),
+    Unsupported(FitError),
     /// Ctrl-C, and nothing that is good enough was found before it.
     #[error("{0}")]
     Interrupted(String),
@@ -74,7 +74,7 @@ impl FitOrder {
         stage: &Stage,
     ) -> Result<Result<Fit, FitError>, CalibrateError> {
         match fit::fit(&log.dataset, stage, &self.settings) {
-            Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
+            Err(error @ FitError::Solver(SolveError::Unsupported { .. })) => {
                 Err(CalibrateError::Unsupported(error))
             }
             Err(error) if self.is_interrupted() => Err(CalibrateError::Interrupted(format!(

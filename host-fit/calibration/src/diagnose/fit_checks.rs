@@ -6,6 +6,7 @@ use crate::judge::identify::{FitFailure, check_described};
 use crate::judge::predicted::Predicted;
 use crate::judge::statistics;
 use crate::judge::verdict;
+use crate::words;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Place, Severity};
@@ -61,7 +62,7 @@ pub(super) fn not_field(
     let over_noise = unexplained.filter(|ratio| *ratio > ERROR_TO_NOISE_MAX);
     let severity = over_noise.map_or(Severity::Note, |_| Severity::Warn);
     let kind = Kind::OtherModel {
-        reason: fit.model_reason.clone(),
+        reason: words::model_reason(fit),
         in_service_micro: predicted
             .map(|predicted| predicted.range.map(|ends| ends.map(|end| end * 1e6))),
         over_noise,

@@ -4,6 +4,7 @@ use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
+use hallstage_solver::solve::Stopped;
 use runtime::matrix::to_rows;
 use runtime::{MotionCorrection, Temperature};
 use std::time::Duration;
@@ -28,8 +29,8 @@ pub struct Estimate {
     pub evaluations: u64,
     /// Time that the solver took.
     pub elapsed: Duration,
-    /// Why the solver stopped, for the report.
-    pub stopped: String,
+    /// Why the solver stopped.
+    pub stopped: Stopped,
 }
 
 impl Estimate {

@@ -2,13 +2,13 @@
 //! Model (31) has the smaller errors in service.
 
 use super::job::{Job, check_near};
-use super::{Estimate, Fit, FitError, FittedRows};
+use super::{Estimate, Fit, FitError, FittedRows, ModelReason};
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::field::WhiteFit;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::problem::Problem;
 use hallstage_solver::estimator::robust::{self, Loss};
-use hallstage_solver::solve::Solver;
+use hallstage_solver::solve::{Solver, Stopped};
 use runtime::ModelKind;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -81,10 +81,9 @@ impl Job<'_> {
             delta_m: None,
             evaluations: first.evaluations + u64::from(found.iterations),
             elapsed: first.elapsed + started.elapsed(),
-            stopped: format!(
-                "maximum a posteriori reached {} steps after model (31)",
-                found.iterations
-            ),
+            stopped: Stopped::FieldModel {
+                steps: found.iterations,
+            },
         };
         let fitted = FittedRows {
             numbers: self.selected.clone(),
@@ -94,7 +93,7 @@ impl Job<'_> {
         let fit = self.judged(model, estimate, fitted)?;
         self.check_described(&fit)?;
         Ok(Fit {
-            model_reason: comparison.to_string(),
+            model_reason: ModelReason::Compared(comparison),
             field: Some(found.figures),
             ..fit
         })

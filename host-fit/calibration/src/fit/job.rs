@@ -2,7 +2,7 @@
 
 use super::calibration::reach;
 use super::field::FirstPhase;
-use super::{Estimate, Fit, FitError, FitSettings, FittedRows, ModelChoice};
+use super::{Estimate, Fit, FitError, FitSettings, FittedRows, ModelChoice, ModelReason};
 use crate::judge::identify::{check_described, check_determined, check_motion};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
@@ -75,14 +75,15 @@ impl<'a> Job<'a> {
                     return Ok(fit);
                 }
                 Ok(fit) => fit.model_reason,
-                Err(error) => error.to_string(),
+                Err(error) => ModelReason::NoField(error),
             }
         } else {
-            "--solver and --project choose how models of the paper are fitted; the field model has a way of its own".to_owned()
+            ModelReason::OtherSolver
         };
-        let mut fit = self.fit_model(Model::from_kind(ModelKind::M31))?;
-        fit.model_reason = format!("model (31): {reason}");
-        Ok(fit)
+        Ok(Fit {
+            model_reason: reason,
+            ..self.fit_model(Model::from_kind(ModelKind::M31))?
+        })
     }
 
     fn fit_model(&self, model: &'static Model) -> Result<Fit, FitError> {
@@ -193,10 +194,7 @@ impl<'a> Job<'a> {
             check_near(stage, model, &parameters)?;
             determined?;
         }
-        Ok(Fit {
-            model_reason: format!("model ({}): --model asks for it", model.name),
-            ..fit
-        })
+        Ok(fit)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
 use crate::judge::statistics::PoseError;
-use hallstage_input::axis::sign;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
@@ -29,9 +28,6 @@ const ERROR_TO_MOTION_MAX_BASELINE: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitFailure {
     /// Fewer rows than unknowns.
-    #[error(
-        "{rows} rows cannot determine {unknowns} unknowns of model ({model}): use a longer log or a larger --train"
-    )]
     TooFewRows {
         /// Rows that the fit had.
         rows: usize,
@@ -41,11 +37,6 @@ pub enum FitFailure {
         model: &'static str,
     },
     /// An axis does not move in the log.
-    #[error(
-        "{} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
-         cannot be found: record {}{}",
-        motion.axis(), motion.recording(), without(*motion), unit = sign(motion.micro_unit())
-    )]
     NoMotion {
         /// The motion that is missing.
         motion: Motion,
@@ -57,10 +48,6 @@ pub enum FitFailure {
         parameters: String,
     },
     /// A Hall probe reads nothing but noise while the stage moves.
-    #[error(
-        "Hall probe {probe} does not follow the motion in the log (span {span_micro:.3} µm, noise {noise_micro:.3} µm): \
-         check the probe, its cable and its column"
-    )]
     DeadProbe {
         /// The probe.
         probe: &'static str,
@@ -70,20 +57,13 @@ pub enum FitFailure {
         noise_micro: f64,
     },
     /// The motion of the log does not determine these parameters.
-    #[error("the log does not determine {what}: {remedy}")]
     NotDetermined {
         /// The parameters, with their standard errors where there are any.
-        what: String,
-        /// What to record.
-        remedy: String,
+        parameters: Vec<(ParameterId, Option<f64>)>,
+        /// The motions that show them.
+        motions: Vec<Motion>,
     },
     /// The fitted model explains too little of the motion.
-    #[error(
-        "the fitted model ({model}) does not describe this log: its errors are {error_micro:.1} {unit} rms in {axis}, \
-         the motion itself has {motion_micro:.1} {unit} rms. Check the columns, the order and signs of the sensors \
-         and the scales in stage.toml, and record a log where the stage moves along {axis}",
-        axis = motion.axis(), unit = sign(motion.micro_unit())
-    )]
     NotDescribed {
         /// Name of the model.
         model: &'static str,
@@ -157,16 +137,6 @@ pub fn check_motion(
     Ok(())
 }
 
-/// The way out where a log has no vertical motion.
-const fn without(motion: Motion) -> &'static str {
-    match motion {
-        Motion::X | Motion::Y | Motion::Rz => "",
-        Motion::Z | Motion::Rx | Motion::Ry => {
-            ", or fit a model without vertical terms (--model 30)"
-        }
-    }
-}
-
 fn stands_still(span: f64, noise: f64) -> bool {
     span == 0.0 || (span <= SPAN_TO_NOISE_MIN * noise && span <= SPAN_OF_MOTION)
 }
@@ -229,8 +199,7 @@ pub fn check_determined(
 ) -> Result<(), FitFailure> {
     let misalignment_rad = parameters.geometry().misalignment_rad;
     let ranges = search_box(stage, model, misalignment_rad);
-    let mut what = Vec::new();
-    let mut remedies: Vec<&str> = Vec::new();
+    let (mut parameters, mut motions) = (Vec::new(), Vec::new());
     for id in model.free() {
         let open = uncertainty.undetermined.contains(&id);
         let error = uncertainty.motion_error[id.index];
@@ -238,34 +207,18 @@ pub fn check_determined(
         if !open && (error <= useless || error <= tolerable(&id, vertical_span)) {
             continue;
         }
-        what.push(if open {
-            id.name()
-        } else {
-            format!(
-                "{} (standard error {error:.3e} {})",
-                id.name(),
-                id.term.unit
-            )
-        });
-        let remedy = id.seen_in(stage).recording();
-        if !remedies.contains(&remedy) {
-            remedies.push(remedy);
+        parameters.push((id, (!open).then_some(error)));
+        let motion = id.seen_in(stage);
+        if !motions.contains(&motion) {
+            motions.push(motion);
         }
     }
-    if what.is_empty() {
+    if parameters.is_empty() {
         return Ok(());
     }
-    let mut remedy = format!(
-        "record independent {}, with larger amplitude or more rows (or, if --solver named a search, it may have \
-         ended far from the best fit: take the default)",
-        remedies.join(", ")
-    );
-    if uncertainty.undetermined.iter().any(ParameterId::is_slope) {
-        remedy.push_str("; without vertical motion use --model 30");
-    }
     Err(FitFailure::NotDetermined {
-        what: what.join(", "),
-        remedy,
+        parameters,
+        motions,
     })
 }
 

@@ -56,11 +56,6 @@ pub struct Plan {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// An axis cannot reach its amplitude within its limits.
-    #[error(
-        "a run of {seconds} s cannot move {axis} by {:.1} {} to both sides within the limits of its speed and \
-         acceleration; make the run longer, or change amplitude or limits in [motion] of stage.toml",
-        amplitude * 1e6, if axis.starts_with('r') { "µrad" } else { "µm" }
-    )]
     TooFast {
         /// Its key in `[motion]`.
         axis: &'static str,
@@ -70,32 +65,20 @@ pub enum PlanError {
         seconds: f64,
     },
     /// There are fewer than six different frequencies for the axes.
-    #[error(
-        "a run of {seconds} s is too short for six different frequencies within the limits of speed and acceleration; \
-         make it longer, or raise the limits in [motion] of stage.toml"
-    )]
     TooFewFrequencies {
         /// The length, s.
         seconds: f64,
     },
     /// The designed probes do not determine a pose of the service.
-    #[error(
-        "the probes as designed do not determine every pose of the service; correct [hall] or the range of service in \
-         [motion] of stage.toml"
-    )]
     NoPose,
     /// The run does not determine the field model.
-    #[error(
-        "a run of {seconds} s does not determine the field model: errors predicted for service are {:.2} / {:.2} / \
-         {:.2} times the noise floor in X / Y / Rz, where {RATIO_MAX} is the most; {remedy}", ratios[0], ratios[1], ratios[2]
-    )]
     NotDetermined {
         /// The length, s.
         seconds: f64,
         /// Errors in service over the noise floor, X, Y, Rz.
         ratios: [f64; 3],
-        /// The remedy.
-        remedy: String,
+        /// Keys of the axes that do not move over their whole range of service.
+        short_axes: Vec<&'static str>,
     },
 }
 
@@ -138,7 +121,7 @@ pub fn judged(stage: &Stage, forecaster: &Forecaster, run: PlannedRun) -> Result
         Err(PlanError::NotDetermined {
             seconds: run.seconds,
             ratios,
-            remedy: remedy(stage, &run),
+            short_axes: short_axes(stage, &run),
         })
     };
     let Some(forecast) = forecast(forecaster, &run, stage.servo_period_s, step_s) else {
@@ -152,19 +135,10 @@ pub fn judged(stage: &Stage, forecaster: &Forecaster, run: PlannedRun) -> Result
     }
 }
 
-/// The remedy for a run that determines too little.
-fn remedy(stage: &Stage, run: &PlannedRun) -> String {
-    let short = AXES.iter().zip(&stage.motion.axes).zip(run.amplitudes);
-    let short: Vec<&str> = short
-        .filter(|((_, motion), amplitude)| *amplitude < motion.service)
+/// Keys of the axes that do not move over their whole range of service.
+fn short_axes(stage: &Stage, run: &PlannedRun) -> Vec<&'static str> {
+    let axes = AXES.iter().zip(&stage.motion.axes).zip(run.amplitudes);
+    axes.filter(|((_, motion), amplitude)| *amplitude < motion.service)
         .map(|((axis, _), _)| axis.key)
-        .collect();
-    if short.is_empty() {
-        "make the run longer".to_owned()
-    } else {
-        let axes = short.join(", ");
-        format!(
-            "move {axes} over their whole range of service: raise the amplitude in [motion] of stage.toml, or make the run longer"
-        )
-    }
+        .collect()
 }

@@ -7,7 +7,7 @@ use crate::estimator::model::{COUNT, Model, ParameterId};
 use crate::estimator::paper::{Parameters, SLOPES, THETA, search_box};
 use crate::estimator::problem::Problem;
 use crate::estimator::zero_deviation::ZeroDeviation;
-use crate::solve::{Solution, SolveError};
+use crate::solve::{Solution, SolveError, Stopped};
 use hallstage_input::stage::{Range, Stage};
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::time::Duration;
@@ -121,8 +121,8 @@ pub(super) fn fit(
         history: Vec::new(),
         elapsed: Duration::ZERO,
         stopped: match at.reached {
-            true => "converged".to_owned(),
-            false => "no further step lowers the cost".to_owned(),
+            true => Stopped::Converged,
+            false => Stopped::NoLowerCost,
         },
     })
 }

@@ -44,18 +44,6 @@ impl Motion {
             Self::Rz | Self::Rx | Self::Ry => "urad",
         }
     }
-
-    /// What to record, after "record" or "record independent".
-    pub const fn recording(self) -> &'static str {
-        match self {
-            Self::X => "X motion",
-            Self::Y => "Y motion",
-            Self::Rz => "Rz motion",
-            Self::Z => "movements at different heights Z",
-            Self::Rx => "movements at different tilts Rx",
-            Self::Ry => "movements at different tilts Ry",
-        }
-    }
 }
 
 /// One parameter that each of the three probes has.

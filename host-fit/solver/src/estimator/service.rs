@@ -249,30 +249,6 @@ impl Comparison {
     }
 }
 
-impl std::fmt::Display for Comparison {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let words = |[x, y, rz]: [f64; 3]| {
-            format!("{x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")
-        };
-        let (field, model_31) = (words(self.service.ratios()), self.service.ratios_31());
-        if self.field {
-            write!(
-                f,
-                "the field model: errors predicted over the range of the log are {field}, and with model (31) {}",
-                words(model_31)
-            )
-        } else if self.loses() {
-            write!(
-                f,
-                "this log leaves the field model with errors of {field}; record all six axes moving at \
-                 once, and for longer (host-fit plan makes such a run)"
-            )
-        } else {
-            f.write_str("the field model finds nothing that model (31) lacks")
-        }
-    }
-}
-
 /// Poses (X, Y, Rz and Z, Rx, Ry) spread evenly in the box of the largest magnitudes given.
 pub fn service_poses(
     (planar_range, vertical_range): ([f64; 3], [f64; 3]),

@@ -55,7 +55,7 @@ fn eight_seconds_give_the_parameters_within_their_standard_errors() {
     for ratio in fit.figures.comparison.service.ratios() {
         assert!(ratio < 1.02, "{ratio}");
     }
-    assert!(fit.figures.comparison.field, "{}", fit.figures.comparison);
+    assert!(fit.figures.comparison.field, "{:?}", fit.figures.comparison);
     assert!(fit.iterations <= 8, "{}", fit.iterations);
 }
 
@@ -125,7 +125,7 @@ fn a_log_of_still_heights_cannot_carry_the_model() {
     }
     .dataset(&parameters());
     match fit(&dataset) {
-        Err(FieldFitError::NotCarried(verdict)) => assert!(!verdict.field, "{verdict}"),
+        Err(FieldFitError::NotCarried(verdict)) => assert!(!verdict.field, "{verdict:?}"),
         other => panic!("{other:?}"),
     }
 }
@@ -134,7 +134,11 @@ fn a_log_of_still_heights_cannot_carry_the_model() {
 fn a_stage_that_is_model_31_keeps_it() {
     let truth = FieldParameters::from_model_31(&parameters().model_31(), &stage());
     let fit = fit(&Run::EIGHT_SECONDS.dataset(&truth)).expect("a fit");
-    assert!(!fit.figures.comparison.field, "{}", fit.figures.comparison);
+    assert!(
+        !fit.figures.comparison.field,
+        "{:?}",
+        fit.figures.comparison
+    );
 }
 
 /// Two runs, the second with a mount that is 5 K warmer. The magnets differ in k.

@@ -3,7 +3,7 @@
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
 use super::search::run::{SearchOptions, SearchResult, Stall};
-use super::{Projection, Solution, SolveError, SolverOptions};
+use super::{Projection, Solution, SolveError, SolverOptions, Stopped};
 use crate::estimator::problem::Problem;
 
 /// When a search on the form `linear` is at the optimum: to 5e-7 of the fitness on each of 200
@@ -35,8 +35,6 @@ pub fn solve(
         solver: kind.name(),
         model: problem.model.name,
         projection: options.projection.name(),
-        reason: "in this form only a model with slopes has unknowns left to search for: \
-                 use --project delta or none, or --solver lm",
     })?;
     // The other forms fall in steps with long rests between them.
     let stall = match options.projection {
@@ -85,10 +83,11 @@ pub fn solution_of(
         evaluations: found.evaluations as u64,
         history: found.history.clone(),
         elapsed: std::time::Duration::ZERO,
-        stopped: format!(
-            "{}; {} of {} evaluations had no cost",
-            found.reason, found.nan_costs, found.evaluations
-        ),
+        stopped: Stopped::Search {
+            reason: found.reason,
+            nan_costs: found.nan_costs,
+            evaluations: found.evaluations,
+        },
     })
 }
 

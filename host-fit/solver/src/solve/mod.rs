@@ -36,7 +36,7 @@ use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
 use hallstage_input::watch::Watch;
 use search::kind::SearchKind;
-use search::run::Checkpoint;
+use search::run::{Checkpoint, StopReason};
 use std::time::{Duration, Instant};
 
 /// How much of the problem is solved in closed form.
@@ -150,27 +150,44 @@ pub struct Solution {
     pub history: Vec<Checkpoint>,
     /// Time that the solver took.
     pub elapsed: Duration,
-    /// Why it stopped, for the report.
-    pub stopped: String,
+    /// Why it stopped.
+    pub stopped: Stopped,
+}
+
+/// Why a solver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// At the minimum.
+    Converged,
+    /// No further step lowers the cost.
+    NoLowerCost,
+    /// At the maximum of the posterior of the field model, after a fit of Model (31).
+    FieldModel {
+        /// Gauss-Newton steps.
+        steps: u32,
+    },
+    /// A search stopped.
+    Search {
+        /// Why.
+        reason: StopReason,
+        /// Evaluations that gave NaN.
+        nan_costs: usize,
+        /// All evaluations.
+        evaluations: usize,
+    },
 }
 
 /// Why a solver gave nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// The signals of the three probes do not span three dimensions.
-    #[error(
-        "the log does not move the stage in X, Y and Rz independently, so the three probes cannot \
-         be separated: record movements along each of the three axes"
-    )]
+    #[error("the signals do not span three dimensions")]
     NoPlanarMotion,
     /// No start led anywhere.
-    #[error(
-        "every start of the search has a row beside a pole of 1/phi or a singular PM, so there is nothing to \
-         improve. Check the search ranges in stage.toml against the vertical motion in the log"
-    )]
+    #[error("no start has a finite cost")]
     NoUsableStart,
     /// The solver does not know this form of the problem.
-    #[error("solver {solver} cannot solve model ({model}) with --project {projection}: {reason}")]
+    #[error("{solver} cannot solve model ({model}) in the form {projection}")]
     Unsupported {
         /// Name of the solver.
         solver: &'static str,
@@ -178,7 +195,5 @@ pub enum SolveError {
         model: &'static str,
         /// The form asked for.
         projection: &'static str,
-        /// What to do instead.
-        reason: &'static str,
     },
 }

@@ -63,17 +63,6 @@ pub enum StopReason {
     Stall,
 }
 
-impl core::fmt::Display for StopReason {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Interrupted => "interrupted; the best so far is kept",
-            Self::Generations => "all generations were run",
-            Self::Evaluations => "the budget of evaluations was used",
-            Self::Stall => "the best cost no longer fell",
-        })
-    }
-}
-
 /// The state after one generation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Checkpoint {
