@@ -167,6 +167,17 @@ pub enum UpdateError {
         /// Their sequence number.
         sequence: u32,
     },
+    /// Another host stored parameters after them.
+    #[error(
+        "the parameters are stored as number {sequence}, but another computer stored number {newest} after them: \
+         `host-fit identify` shows which parameters the controller runs"
+    )]
+    Replaced {
+        /// Their sequence number.
+        sequence: u32,
+        /// The newest sequence number.
+        newest: u32,
+    },
     /// The new parameters are stored, and then the node was silent.
     #[error(
         "the parameters are stored as number {sequence}, but the controller has not answered for 3 s since: is it on? \

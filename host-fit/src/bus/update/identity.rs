@@ -74,7 +74,10 @@ fn ask_blob<L: Link>(
 }
 
 /// A fact; `None` where the node has no parameters, and so no such fact.
-fn ask_page<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateError> {
+pub(super) fn ask_page<L: Link>(
+    talk: &mut Talk<L>,
+    number: u8,
+) -> Result<Option<u32>, UpdateError> {
     match talk.exchange(tell(number))? {
         (Outcome::Done, word) => Ok(Some(word)),
         (Outcome::NoParameters, _) => Ok(None),

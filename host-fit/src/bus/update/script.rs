@@ -2,10 +2,10 @@
 //! node so that it runs the blob, declare the servo on.
 
 use super::UpdateError;
-use super::identity::{Identity, ask_next, ask_running, identify};
+use super::identity::{Identity, ask_next, ask_page, ask_running, identify};
 use super::talk::{Link, Talk, words};
 use hal_adapters::can::command::{Command, Outcome, Request};
-use hal_adapters::can::update::{BlobId, Key, UpdateRequest, blob_crc};
+use hal_adapters::can::update::{BlobId, Key, UpdateRequest, blob_crc, page};
 use runtime::ParameterSet;
 
 /// How long the servo is declared off, s: longer than an update takes on a bad bus.
@@ -249,15 +249,24 @@ impl<L: Link> Script<'_, L> {
                 self.talk.pause(PROVEN_US)?;
                 return match self.runs().map_err(silent)? {
                     true => Ok(()),
-                    false => Err(UpdateError::NotActive { sequence }),
+                    false => Err(self.not_active()),
                 };
             }
         }
         if outcome == Outcome::Done {
-            return Err(UpdateError::NotActive { sequence });
+            return Err(self.not_active());
         }
         self.declared &= outcome != Outcome::Busy;
         Err(UpdateError::NotActivated { sequence })
+    }
+
+    /// Why the node does not run the blob after a reset.
+    fn not_active(&mut self) -> UpdateError {
+        let sequence = self.wanted.sequence;
+        match ask_page(self.talk, page::NEWEST_SEQUENCE) {
+            Ok(Some(newest)) if newest > sequence => UpdateError::Replaced { sequence, newest },
+            _ => UpdateError::NotActive { sequence },
+        }
     }
 
     fn runs(&mut self) -> Result<bool, UpdateError> {
