@@ -10,6 +10,7 @@
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`temperature`] | findings about temperature |
 //! | [`refusal`] | why a calibration is not to be used |
+//! | `units` | units that are read as others |
 //! | `slopes` | the effect of an error of each channel on the Hall signals |
 //! | `limits` | the limits that these tests share |
 //!
@@ -45,6 +46,7 @@ pub mod structure;
 #[cfg(test)]
 mod structure_tests;
 pub mod temperature;
+mod units;
 
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;

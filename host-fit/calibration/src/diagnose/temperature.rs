@@ -1,6 +1,8 @@
 //! Findings about temperature: k and h, the cost of a drift in the log, rows without a temperature, and when to zero
 //! again.
 
+use super::limits::{RARITY, UNDECIDED};
+use super::units;
 use crate::fit::Fit;
 use crate::judge::predicted::declared_service;
 use crate::judge::statistics::white_noise;
@@ -10,7 +12,7 @@ use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::posterior::covariance_at;
 use hallstage_solver::estimator::temperature::Coefficient;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2, Vector2};
 use runtime::Temperature;
 use runtime::real::Real;
 
@@ -92,7 +94,60 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
             false => found,
         }
     });
-    there.map(finding).chain(incomplete).collect()
+    // k of all probes over its expected value.
+    let k_part = |sensor: usize| {
+        let [expected, _] = stage.temperature.prior_per_k[sensor];
+        let sum: f64 = (0..3).map(|probe| temperature.per_mk[probe][sensor]).sum();
+        (spans_k[sensor] > 0.0 && expected != 0.0).then(|| sum * 1e3 / (3.0 * expected))
+    };
+    let unit = |sensor: usize| {
+        let mean_c = f64::from(temperature.zero_mc[sensor]) * 1e-3;
+        units::of_temperature(mean_c, k_part(sensor))
+    };
+    let are_fitted = fit.field.is_some() && spans_k.iter().all(|span_k| *span_k > 0.0);
+    let exchanged = are_fitted.then(|| exchanged(fit, stage)).flatten();
+    let units = there.clone().find_map(unit).into_iter();
+    let mistakes = units.chain(exchanged).chain(incomplete);
+    there.map(finding).chain(mistakes).collect()
+}
+
+/// The columns of mount and body, exchanged, where they explain k and h better.
+fn exchanged(fit: &Fit, stage: &Stage) -> Option<Finding> {
+    let covariance = &fit.estimate.posterior.covariance;
+    let of_probe = |probe: usize| {
+        let rows = [0, 1].map(|sensor| Coefficient::new(probe, sensor).row());
+        let errors = Matrix2::from_fn(|i, j| covariance[(rows[i], rows[j])]);
+        let found = fit.calibration.temperature.per_mk[probe].map(|per_mk| per_mk * 1e3);
+        odds_of_exchange(found, &errors, stage.temperature.prior_per_k)
+    };
+    let log_odds = of_probe(0)? + of_probe(1)? + of_probe(2)?;
+    let found = Finding::new(Kind::TemperaturesExchanged { log_odds });
+    let is_clear = 2.0 * log_odds > UNDECIDED + 2.0 * libm::log(RARITY);
+    is_clear.then(|| found.with_severity(Severity::Refuse))
+}
+
+/// How much more likely, as a logarithm, k and h of a probe are with the priors exchanged, 1/K.
+fn odds_of_exchange(found: [f64; 2], errors: &Matrix2<f64>, prior: [[f64; 2]; 2]) -> Option<f64> {
+    let precision = |prior: [[f64; 2]; 2]| {
+        let of = prior.map(|[_, deviation]| 1.0 / (deviation * deviation));
+        let (of, mean) = (
+            Matrix2::from_diagonal(&of.into()),
+            prior.map(|[mean, _]| mean),
+        );
+        (of, of * Vector2::from(mean), Vector2::from(mean))
+    };
+    // What the logs say is the result of the fit without its prior.
+    let (own, own_sum, _) = precision(prior);
+    let all = errors.try_inverse()?;
+    let (said, said_sum) = (all - own, all * Vector2::from(found) - own_sum);
+    let evidence = |prior: [[f64; 2]; 2]| {
+        let (own, own_sum, mean) = precision(prior);
+        let (all, sum) = (said + own, said_sum + own_sum);
+        let spread = libm::log(own.determinant() / all.determinant());
+        Some(0.5 * (spread + sum.dot(&(all.try_inverse()? * sum)) - own_sum.dot(&mean)))
+    };
+    let [k, h] = prior;
+    Some(evidence([h, k])? - evidence([k, h])?)
 }
 
 /// Rows without a temperature that the calibration needs, or with a temperature too far from T0 to be true.
@@ -215,6 +270,20 @@ mod tests {
                 .map(|found| found.movement().expect("a movement"));
             assert_eq!(found, movement, "{movements:?} {refitted}");
         }
+    }
+
+    #[test]
+    fn exchanged_temperatures_are_likely_only_where_logs_determine_k_or_h() {
+        let prior = [[-1.2e-3, 3e-4], [0.0, 2e-4]];
+        let errors = |deviation: f64| Matrix2::from_diagonal_element(deviation * deviation);
+        let odds = |found, error| odds_of_exchange(found, &errors(error), prior).expect("odds");
+        assert!(odds([-1.1e-3, 1e-4], 4e-5) < -10.0);
+        assert!(odds([1e-4, -1.1e-3], 4e-5) > 10.0);
+        assert!(odds([-6e-4, -6e-4], 4e-5).abs() < 1.0);
+        // The prior alone.
+        let errors = Matrix2::from_diagonal(&[9e-8, 4e-8].into());
+        let by_prior = odds_of_exchange([-1.2e-3, 0.0], &errors, prior).expect("odds");
+        assert!(by_prior.abs() < 1e-9, "{by_prior}");
     }
 
     #[test]

@@ -42,6 +42,7 @@ pub(super) fn evidence(found: &Finding) -> String {
             let thinned = periods.map_or(String::new(), |periods| format!("the log is thinned to one of {periods} servo periods: "));
             format!("{thinned}rows are {period_us:.1} µs apart, the servo period in stage.toml is {servo_us:.1} µs")
         }
+        Kind::OtherUnit { what, ratio, units } => format!("{what} are {ratio} times what stage.toml expects, as where {units}"),
         Kind::IdleMovements { movements, of } => format!("nothing moves in {movements} of {}, and rows without motion show nothing", counted(*of, "movement")),
         Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => format!("{on} never changes"),
         Kind::Stands { rows, percent, longest_s } | Kind::StandsAtEnd { rows, percent, longest_s } => {
@@ -136,6 +137,10 @@ pub(super) fn evidence(found: &Finding) -> String {
                 format!(". This is {deviations:.0} standard deviations from `{key}` in [temperature]")
             });
             format!("the coefficient {symbol} of A, B, C is {a}, {b}, {c} %/K of the {place} temperature from {zero_c:.2} °C, {origin}{other}")
+        }
+        Kind::TemperaturesExchanged { log_odds } => {
+            let odds = libm::exp(log_odds.min(libm::log(1e6)));
+            format!("the gains of the probes follow the temperatures better if the columns of mount and body are exchanged (odds of {odds:.0} to 1)")
         }
         Kind::NoTemperature { rows, of, reach_k } => {
             format!("{rows} of {of} rows have no temperature, or one more than {reach_k} K from the calibration, and count as if they had the temperature of the calibration")

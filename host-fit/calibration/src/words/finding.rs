@@ -71,6 +71,8 @@ fn remedy(found: &Finding) -> String {
         Kind::VerticalAtLimit { .. } => "check the order and the signs of the capacitive sensors in the log and in stage.toml",
         Kind::MovementsMissed { .. } => "use --draw stratified, or a larger --train",
         Kind::WildRow { .. } => "if the row is wrong, take it out of the log and fit again",
+        Kind::OtherUnit { .. } => "check the unit of the column in the log and in stage.toml",
+        Kind::TemperaturesExchanged { .. } => "check `mount` and `body` in [temperature], and the sensors",
         Kind::OtherMotion { is_scale: true, .. } => "check units and scales, because nothing else shows a wrong scale of all channels of a kind; or declare the motion",
         Kind::OtherMotion { .. } => "errors beyond the range of the log are larger than predicted; host-fit plan makes a run of the full range",
         Kind::BeyondRange { .. } => "fit logs of the whole range of service",

@@ -146,6 +146,8 @@ kinds! {
     UnevenTimes { rms_us: f64 } => Code::Jitter, *rms_us, "us";
     /// Rows are farther apart than servo periods; `periods` if that is a whole number.
     OtherRate { period_us: f64, servo_us: f64, periods: Option<f64> } => Code::Jitter, *period_us, "us";
+    /// Times or temperatures are this many times what the design expects, as where units are read as others.
+    OtherUnit { what: &'static str, ratio: f64, units: &'static str } => Code::ScaleWrong, *ratio, "";
     /// Movements without motion.
     IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
     /// A channel repeats a value, or shows its noise alone, while it should move.
@@ -213,6 +215,8 @@ kinds! {
     BeyondRange { rows: usize, of: usize } => Code::OutOfRange, *rows as f64, "rows";
     /// k or h of Hall A, B, C with their standard errors, %/K, and where they are from.
     Coefficients { sensor: usize, percent_per_k: [[f64; 2]; 3], zero_c: f64, span_k: f64, is_field: bool, deviations: Option<f64> } => Code::Temperature, *span_k, "K";
+    /// The columns of the two temperatures, exchanged, explain the gains better by this logarithm of odds.
+    TemperaturesExchanged { log_odds: f64 } => Code::ScaleWrong;
     /// Rows without a temperature, or with one that is farther than `reach_k` from the calibration.
     NoTemperature { rows: usize, of: usize, reach_k: u32 } => Code::Temperature, *rows as f64, "rows";
     /// The temperature changes by more than a zero holds.

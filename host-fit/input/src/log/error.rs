@@ -225,7 +225,9 @@ pub enum LogProblem {
         t_us: i64,
     },
     /// A row has the time of the row above.
-    #[error("the row repeats the time {t_us} us of the row above; remove the duplicate")]
+    #[error(
+        "the row repeats the time {t_us} us of the row above; remove the duplicate, or check the unit of the times"
+    )]
     DuplicatedRow {
         /// The time, us.
         t_us: i64,

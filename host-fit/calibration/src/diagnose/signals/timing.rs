@@ -2,6 +2,7 @@
 
 use super::channels::LogSignals;
 use crate::diagnose::limits::severity_of_share;
+use crate::diagnose::units;
 use hallstage_input::finding::{Finding, Kind, Severity};
 
 /// Missing rows and uneven times, from times and sequence numbers. Severity is by the share of the rows or of the
@@ -42,7 +43,9 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
     }
     let servo_us = log.stage.servo_period_s * 1e6;
     let servo_periods = period_us / servo_us;
-    if severity_of_share((servo_periods - 1.0).abs()) > Severity::Note {
+    if let Some(unit) = units::of_times(servo_periods) {
+        found.push(unit);
+    } else if severity_of_share((servo_periods - 1.0).abs()) > Severity::Note {
         let whole = servo_periods.round().max(1.0);
         let severity = severity_of_share((servo_periods / whole - 1.0).abs()).min(Severity::Warn);
         let periods = (severity == Severity::Note).then_some(whole);
@@ -94,7 +97,8 @@ mod tests {
     }
 
     #[test]
-    fn uneven_times_and_another_rate_are_warnings_and_the_rate_of_a_thinned_log_a_note() {
+    fn uneven_times_and_another_rate_are_warnings_and_the_rate_of_a_thinned_log_a_note_unless_it_is_a_unit()
+     {
         let mut random = Stream::new(7, Purpose::Sensors, 0);
         let mut uneven = dataset(&recording());
         for row in &mut uneven.rows {
@@ -104,9 +108,10 @@ mod tests {
         assert_eq!((code, severity), (Code::Jitter, Severity::Warn));
         assert!((80.0..93.0).contains(&rms_us), "{rms_us}");
         for (periods, severity) in [
-            (0.5, Severity::Warn),
-            (5.5, Severity::Warn),
-            (4.0, Severity::Note),
+            (0.5, Some(Severity::Warn)),
+            (5.5, Some(Severity::Warn)),
+            (4.0, Some(Severity::Note)),
+            (1000.0, None),
         ] {
             let mut every = dataset(&recording());
             for movement in every.movements.clone() {
@@ -114,9 +119,13 @@ mod tests {
                     row.t_us = (k as f64 * periods * PERIOD_S * 1e6) as i64;
                 }
             }
-            let (code, found, period_us) = only(&every);
-            assert_eq!((code, found), (Code::Jitter, severity), "{periods}");
-            assert!((period_us - 2000.0 * periods).abs() < 0.1, "{period_us}");
+            let found = only(&every);
+            let Some(severity) = severity else {
+                assert_eq!(found, (Code::ScaleWrong, Severity::Refuse, periods));
+                continue;
+            };
+            assert_eq!((found.0, found.1), (Code::Jitter, severity), "{periods}");
+            assert!((found.2 - 2000.0 * periods).abs() < 0.1, "{periods}");
         }
     }
 }
