@@ -311,6 +311,41 @@ mod tests {
     use crate::estimator::sample_for_tests::{Run, parameters};
     use nalgebra::{Cholesky, DMatrix};
 
+    /// Central differences of the residuals, about a stage with lags and accelerations.
+    #[test]
+    fn the_columns_of_motion_are_the_derivatives_of_the_model() {
+        let run = Run {
+            seconds: 1.0,
+            ..Run::EIGHT_SECONDS
+        };
+        let dataset = run.dataset(&parameters());
+        let all: Vec<usize> = (0..dataset.rows.len()).collect();
+        let rows = Rows::new(&dataset, &all);
+        let at = |unknown: usize, change: f64| {
+            let mut values = [0.0; UNKNOWNS];
+            values[LAG..ACCELERATIONS].copy_from_slice(&[2e-3, -1e-3, 4e-4]);
+            values[ACCELERATIONS..].fill(2e-3);
+            values[unknown] += change;
+            let dynamics = Dynamics::from_values(&values);
+            rows.evaluate(&probes(&parameters()), &dynamics, &[[0.0; 3]])
+        };
+        for unknown in LAG..UNKNOWNS {
+            let step = 1e-4;
+            let (before, after) = (at(unknown, -step), at(unknown, step));
+            let mut largest: f64 = 0.0;
+            for (k, block) in at(unknown, 0.0).iter().enumerate() {
+                let found: [[f64; COLUMNS]; 3] = columns(block);
+                for probe in 0..3 {
+                    let change = before[k].residual_mm[probe] - after[k].residual_mm[probe];
+                    let error = (found[probe][unknown] - change / (2.0 * step)).abs();
+                    assert!(error < 1e-6, "{unknown}, {probe}: {error}");
+                    largest = largest.max(found[probe][unknown].abs());
+                }
+            }
+            assert!(largest > 1e-3, "{unknown}: {largest}");
+        }
+    }
+
     /// The same sums from the covariance of all residuals of each movement, written out whole:
     /// white noise, walk and offset.
     #[test]
