@@ -32,7 +32,7 @@ pub(super) fn probe_motion(fit: &Fit) -> Group {
     });
     group! {
         "lag" => Figure::List(lags.collect()),
-        "by_acceleration" => motion.is_determined.then(|| Figure::List(added.collect())),
+        "by_acceleration" => motion.shows_acceleration.then(|| Figure::List(added.collect())),
         "correction" => json!(correction),
     }
 }

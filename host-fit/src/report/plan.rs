@@ -10,11 +10,10 @@ use hallstage_calibration::plan::run::TONES_HZ;
 use hallstage_calibration::plan::temperature::WarmLog;
 use hallstage_input::axis::{AXES, PLANAR};
 use hallstage_input::stage::Stage;
+use hallstage_solver::estimator::dynamics::ACCELERATION_ERROR_MAX;
 use hallstage_solver::estimator::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
-/// Standard error that leaves the change of a signal by acceleration unknown, m per m/s2: such a fit does without it.
-const ACCELERATION_ERROR_MAX: f64 = 1e-6;
 /// Number of the least determined parameters that are named.
 const NAMED: usize = 5;
 
@@ -93,7 +92,7 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
 /// Standard error of the change of a probe's signal by the acceleration of X, Y or Rz.
 fn per_acceleration(plan: &Plan, k: usize, stage: &Stage) -> Group {
     let error = acceleration_error(&plan.run, k, stage.servo_period_s);
-    group! { "standard_error" => bare(rounded(error * 1e6, 2), "um/(m/s2)") }
+    group! { "standard_error" => bare(rounded(error * 1e3, 2), "um/(m/s2)") }
 }
 
 /// What the run cannot tell, if there is something: errors that follow an acceleration.

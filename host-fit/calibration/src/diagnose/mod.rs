@@ -112,7 +112,7 @@ pub fn diagnose_log(
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_fitted: fitted.is_ok(),
-        shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.is_determined),
+        shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.shows_acceleration),
     };
     let mut out = Diagnosis::default();
     // A log that determines no parameters shows nothing of its channels.

@@ -37,7 +37,7 @@ impl Estimate {
     /// The correction by commanded speed and acceleration; `None` unless the log determines what acceleration adds.
     pub fn motion_correction(&self) -> Option<MotionCorrection> {
         let found = self.motion.correction(&self.parameters);
-        let [acceleration, velocity] = found.filter(|_| self.motion.is_determined)?;
+        let [acceleration, velocity] = found.filter(|_| self.motion.shows_acceleration)?;
         let rows = |m| to_rows(m).map(|row| row.map(|x| x as f32));
         Some(MotionCorrection {
             acceleration_s2: rows(&acceleration),

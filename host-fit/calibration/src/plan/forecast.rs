@@ -57,12 +57,12 @@ pub fn forecast(
 }
 
 /// Standard error of the change of a probe's signal by the acceleration of an axis, as the fast tone of a run
-/// determines it, m per m/s2, rotations at 0.25 m: sigma sqrt(2 / N) / (B w^2), with the noise sigma of N rows and
+/// determines it, mm per m/s2, rotations at 0.25 m: sigma sqrt(2 / N) / (B w^2), with the noise sigma of N rows and
 /// the rate w of the tone. Infinite without a tone.
 pub fn acceleration_error(run: &PlannedRun, axis: usize, period_s: f64) -> f64 {
     let rate = TAU * TONES_HZ[axis];
     let acceleration = ARMS_M[axis] * run.tones[axis] * rate * rate;
-    SensorErrors::USUAL.hall_m * (2.0 / run.rows(period_s) as f64).sqrt() / acceleration
+    SensorErrors::USUAL.hall_m * 1e3 * (2.0 / run.rows(period_s) as f64).sqrt() / acceleration
 }
 
 /// Rows of runs, sampled every `step_s`. Each run is a movement at a distance (mount, body) from T0 in K.

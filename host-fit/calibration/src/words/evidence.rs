@@ -115,8 +115,8 @@ pub(super) fn evidence(found: &Finding) -> String {
             let unit = sign(unit);
             format!("the log moves {on} by {micro:.0} {unit} to either side, service by {service_micro:.0} {unit} ([motion] in stage.toml)")
         }
-        Kind::InMotion { ratio, corrected_ratio, acceleration_m_s2, speed_mm_s, is_determined, lag_us: [a, b, c] } => {
-            let (corrected, known) = match is_determined {
+        Kind::InMotion { ratio, corrected_ratio, acceleration_m_s2, speed_mm_s, shows_acceleration, lag_us: [a, b, c] } => {
+            let (corrected, known) = match shows_acceleration {
                 true => (format!(", and {corrected_ratio:.2} times with the correction by commanded speed and acceleration"), ""),
                 false => (String::new(), ". The log does not show what acceleration does to the probes"),
             };

@@ -53,7 +53,7 @@ fn remedy(found: &Finding) -> String {
             return format!("zero the stage again after every {rezero_k} K, because offsets and expansion are not in the model");
         }
         Kind::Mistake { code, causes, may_be_magnets, .. } => return mistake_remedy(*code, causes, *may_be_magnets),
-        Kind::InMotion { is_determined: false, .. } => "record the run of host-fit plan, whose second tone shows it, or evaluate on your fastest motion",
+        Kind::InMotion { shows_acceleration: false, .. } => "record the run of host-fit plan, whose second tone shows it, or evaluate on your fastest motion",
         Kind::SingleRows { .. } => "check the movement column",
         Kind::RowsMissing { .. } => "look for frames that the recorder lost",
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",

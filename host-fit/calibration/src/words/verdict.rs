@@ -43,7 +43,7 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
 /// The motion up to which errors are good.
 pub fn up_to(motion: &InMotion) -> String {
     let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
-    let open = match motion.fit.is_determined {
+    let open = match motion.fit.shows_acceleration {
         true => "",
         false => "; the log does not show the effect of more acceleration",
     };

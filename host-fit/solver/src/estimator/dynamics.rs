@@ -8,7 +8,7 @@
 use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::whiten::{ACCELERATIONS, LAG, PROBE_LAGS};
-use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix, Vector3};
+use nalgebra::{Cholesky, Const, DMatrix, Matrix2, Matrix3, SMatrix, Vector3};
 use runtime::matrix::{from_rows, inverse};
 
 /// Rotations count at this arm, m: an acceleration in rad/s2 times the arm is in m/s2.
@@ -20,8 +20,8 @@ pub const PROBE_LAG_S: f64 = 1e-3;
 /// Standard deviation of a reading's change by acceleration before a log is seen, mm per m/s2. A motor coil 5 cm away has
 /// 7e-3, an arm with a resonance at 120 Hz 1e-3 to 4e-3.
 pub const PER_ACCELERATION: f64 = 3e-3;
-/// A log whose posterior leaves less of it, mm per m/s2, determines it.
-const DETERMINED: f64 = 1e-3;
+/// A log that leaves a smaller standard error, mm per m/s2, shows what acceleration adds. Without that it is held at zero.
+pub const ACCELERATION_ERROR_MAX: f64 = 1e-3;
 
 /// Lags, and changes of the readings by acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +43,7 @@ impl Dynamics {
             lag_s: values[LAG],
             probe_lag_s: [a, b, -a - b],
             mm_per_m_s2: [0, 1, 2]
-                .map(|probe| std::array::from_fn(|axis| values[place(probe, axis)])),
+                .map(|probe| std::array::from_fn(|axis| values[column(probe, axis)])),
         }
     }
 
@@ -64,8 +64,8 @@ pub struct MotionFit {
     pub probe_lag_covariance: Matrix3<f64>,
     /// Covariance of the changes of A, B, C by the acceleration of each axis, (mm per m/s2)^2.
     pub acceleration_covariance: [Matrix3<f64>; 6],
-    /// Whether the log determines the changes by acceleration.
-    pub is_determined: bool,
+    /// Whether the log shows the changes by acceleration: the limit is [`ACCELERATION_ERROR_MAX`].
+    pub shows_acceleration: bool,
 }
 
 /// How fast service moves, rms.
@@ -82,12 +82,10 @@ impl MotionFit {
     pub fn unknown() -> Self {
         Self {
             dynamics: Dynamics::default(),
-            probe_lag_covariance: of_three(
-                Matrix2::new(2.0, -1.0, -1.0, 2.0) * (PROBE_LAG_S * PROBE_LAG_S / 3.0),
-            ),
+            probe_lag_covariance: three_lags(lag_prior().l() * lag_prior().l().transpose()),
             acceleration_covariance: [Matrix3::identity() * (PER_ACCELERATION * PER_ACCELERATION);
                 6],
-            is_determined: false,
+            shows_acceleration: false,
         }
     }
 
@@ -98,32 +96,32 @@ impl MotionFit {
                 probe_lag_s: [a, b, -a - b],
                 ..Dynamics::default()
             },
-            probe_lag_covariance: of_three(covariance),
+            probe_lag_covariance: three_lags(covariance),
             ..Self::unknown()
         }
     }
 
     /// From the values and the covariance of a fit of the field model.
-    pub fn new(values: &[f64], covariance: &DMatrix<f64>, is_determined: bool) -> Self {
+    pub fn new(values: &[f64], covariance: &DMatrix<f64>, shows_acceleration: bool) -> Self {
         let lags = covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS);
         let of_axis =
-            |axis: usize| Matrix3::from_fn(|i, k| covariance[(place(i, axis), place(k, axis))]);
+            |axis: usize| Matrix3::from_fn(|i, k| covariance[(column(i, axis), column(k, axis))]);
         Self {
             dynamics: Dynamics::from_values(values),
-            probe_lag_covariance: of_three(lags.into()),
-            acceleration_covariance: match is_determined {
+            probe_lag_covariance: three_lags(lags.into()),
+            acceleration_covariance: match shows_acceleration {
                 true => std::array::from_fn(of_axis),
                 false => Self::unknown().acceleration_covariance,
             },
-            is_determined,
+            shows_acceleration,
         }
     }
 
-    /// Whether this covariance of a fit determines the changes by the acceleration of X, Y, Rz.
-    pub(super) fn determines(covariance: &DMatrix<f64>) -> bool {
-        let places = (0..3).flat_map(|probe| [0, 1, 2].map(|axis| place(probe, axis)));
-        let mut variances = places.map(|k| covariance[(k, k)]);
-        variances.all(|variance| variance < DETERMINED * DETERMINED)
+    /// Whether a log with this covariance of its fit shows the changes by the acceleration of X, Y, Rz.
+    pub(super) fn is_shown_by(covariance: &DMatrix<f64>) -> bool {
+        let columns = (0..3).flat_map(|probe| [0, 1, 2].map(|axis| column(probe, axis)));
+        let mut variances = columns.map(|k| covariance[(k, k)]);
+        variances.all(|variance| variance < ACCELERATION_ERROR_MAX * ACCELERATION_ERROR_MAX)
     }
 
     /// Standard errors of the lags of A, B, C behind their mean, s.
@@ -150,7 +148,7 @@ impl MotionFit {
     /// The same with what it does not determine of acceleration taken as zero.
     #[must_use]
     pub fn without_prior(mut self) -> Self {
-        if !self.is_determined {
+        if !self.shows_acceleration {
             self.acceleration_covariance = [Matrix3::zeros(); 6];
         }
         self
@@ -205,13 +203,21 @@ impl MotionFit {
     }
 }
 
+/// Factor of the prior covariance of the lags of A and B behind the mean of the probes: the lags of the three are
+/// independent, with the deviation [`PROBE_LAG_S`].
+pub(super) fn lag_prior() -> Cholesky<f64, Const<2>> {
+    // L L' = (2, -1; -1, 2) / 3.
+    let [a, b, c] = [2.0 / 3.0, 1.0 / 6.0, 0.5].map(f64::sqrt);
+    Cholesky::pack_dirty(Matrix2::new(a, 0.0, -b, c) * PROBE_LAG_S)
+}
+
 /// The unknown of a fit for a probe and the acceleration of an axis.
-const fn place(probe: usize, axis: usize) -> usize {
+const fn column(probe: usize, axis: usize) -> usize {
     ACCELERATIONS + 6 * probe + axis
 }
 
 /// The covariance of the lags of A, B, C, from that of A and B: their sum is zero.
-fn of_three(two: Matrix2<f64>) -> Matrix3<f64> {
+fn three_lags(two: Matrix2<f64>) -> Matrix3<f64> {
     let by_two = SMatrix::<f64, 3, 2>::new(1.0, 0.0, 0.0, 1.0, -1.0, -1.0);
     by_two * two * by_two.transpose()
 }

@@ -243,8 +243,8 @@ impl WhiteFit {
             value_s: self.at.values[LAG],
             standard_error_s: covariance[(LAG, LAG)].sqrt(),
         };
-        let is_determined = self.shows_acceleration && MotionFit::determines(&covariance);
-        let motion = MotionFit::new(self.at.values.as_slice(), &covariance, is_determined);
+        let shows_acceleration = self.shows_acceleration && MotionFit::is_shown_by(&covariance);
+        let motion = MotionFit::new(self.at.values.as_slice(), &covariance, shows_acceleration);
         let (posterior, temperature) = self.with_temperature(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
@@ -371,7 +371,7 @@ impl WhiteFit {
         if !self.shows_acceleration {
             let open = unknowns(&self.places, self.sensors.deviations(), PER_ACCELERATION);
             let covariance = open.covariance(&self.normal()?);
-            if covariance.is_some_and(|all| MotionFit::determines(&all)) {
+            if covariance.is_some_and(|all| MotionFit::is_shown_by(&all)) {
                 self.unknowns = open;
                 self.shows_acceleration = true;
             }

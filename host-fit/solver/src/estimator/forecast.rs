@@ -103,7 +103,7 @@ impl Forecaster {
         let normal = equations.sum_blocks(&blocks);
         let with = |acceleration| unknowns(&places, temperature, acceleration).covariance(&normal);
         match with(PER_ACCELERATION)? {
-            open if MotionFit::determines(&open) => Some(open),
+            open if MotionFit::is_shown_by(&open) => Some(open),
             _ => with(HELD),
         }
     }

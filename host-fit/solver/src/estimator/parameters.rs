@@ -1,6 +1,6 @@
 //! The values of the 81 parameters, and the decoder's constants made of them.
 
-use super::dynamics::PROBE_LAG_S;
+use super::dynamics::lag_prior;
 use super::temperature::Coefficient;
 use super::terms::{
     CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
@@ -271,11 +271,7 @@ pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2], acceleration: f64
         let deviation = temperature[of.sensor];
         prior[(of.row(), of.row())] = 1.0 / (deviation * deviation);
     }
-    let (a, b) = (PROBE_LAGS, PROBE_LAGS + 1);
-    // The lag of each probe has this deviation; the lag of C is the negative sum.
-    let weight = 1.0 / (PROBE_LAG_S * PROBE_LAG_S);
-    (prior[(a, a)], prior[(b, b)]) = (2.0 * weight, 2.0 * weight);
-    (prior[(a, b)], prior[(b, a)]) = (weight, weight);
+    (prior.fixed_view_mut::<2, 2>(PROBE_LAGS, PROBE_LAGS)).copy_from(&lag_prior().inverse());
     for k in ACCELERATIONS..UNKNOWNS {
         prior[(k, k)] = 1.0 / (acceleration * acceleration);
     }

@@ -6,7 +6,7 @@
 //! an old posterior. The lags of the reference and of the probes, and what
 //! acceleration adds, are unknowns of every log.
 
-use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION, PROBE_LAG_S};
+use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION, lag_prior};
 use super::error::FieldFitError;
 use super::noise::white_mm;
 use super::parameters::FieldParameters;
@@ -194,7 +194,7 @@ pub fn update(
     };
     let expected =
         (equations.normal(&at)).and_then(|normal: Normal<COLUMNS>| unknowns.covariance(&normal));
-    if !expected.is_some_and(|all| MotionFit::determines(&all)) {
+    if !expected.is_some_and(|all| MotionFit::is_shown_by(&all)) {
         unknowns
             .basis
             .rows_mut(ACCELERATIONS, UNKNOWNS - ACCELERATIONS)
@@ -263,7 +263,7 @@ fn factor(
     }
     let lags = known + changes.len();
     l[(LAG, lags)] = LAG_S;
-    (l[(PROBE_LAGS, lags + 1)], l[(PROBE_LAGS + 1, lags + 2)]) = (PROBE_LAG_S, PROBE_LAG_S);
+    (l.fixed_view_mut::<2, 2>(PROBE_LAGS, lags + 1)).copy_from(&lag_prior().l());
     for k in ACCELERATIONS..UNKNOWNS {
         l[(k, lags + 3 + k - ACCELERATIONS)] = PER_ACCELERATION;
     }
