@@ -7,8 +7,9 @@ use crate::cli::terminal;
 use crate::output::Outputs;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use hallstage_input::log::{self, LogReading, ReadOptions};
-use hallstage_input::stage::Stage;
+use hallstage_input::log::{self, BadRows, LogReading, ReadOptions};
+use hallstage_input::source::SourceProblem;
+use hallstage_input::stage::{Stage, StageError};
 use runtime::OnInvalid;
 use runtime::parameters::Text;
 use std::num::ParseIntError;
@@ -30,7 +31,15 @@ pub(super) struct StageFile {
 
 impl StageFile {
     pub(super) fn read(&self) -> Result<Stage, HostError> {
-        Ok(Stage::from_file(&self.path)?)
+        match Stage::from_file(&self.path) {
+            Err(StageError::Source(error)) if matches!(error.problem, SourceProblem::NotFound) => {
+                let path = self.path.display();
+                Err(HostError::input(format!(
+                    "there is no {path}; draft one with `host-fit init LOG`, or name one with --stage"
+                )))
+            }
+            read => Ok(read?),
+        }
     }
 }
 
@@ -42,6 +51,9 @@ pub(super) struct Logs {
     pub(super) paths: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) stage: StageFile,
+    /// What to do with rows that cannot be used.
+    #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
+    bad_rows: BadRows,
 }
 
 impl Logs {
@@ -54,6 +66,7 @@ impl Logs {
     pub(super) fn options(&self, command: ReadOptions) -> ReadOptions {
         ReadOptions {
             watch: interrupt::WATCH,
+            bad_rows: self.bad_rows,
             ..command
         }
     }

@@ -9,7 +9,6 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;
 use hallstage_calibration::fit::{FitSettings, ModelChoice};
-use hallstage_input::log::BadRows;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -42,7 +41,6 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
             limits: Limits::default(),
             is_kept: false,
         },
-        bad_rows: BadRows::Refuse,
         out: None,
     };
     job.run((&args.logs, &args.report, &args.json))

@@ -1,6 +1,6 @@
 //! `host-fit fit`.
 
-use super::arguments::{Json, Logs, Threads, choice};
+use super::arguments::{Json, Logs, Threads};
 use super::fit_options::FitOptions;
 use super::interrupt;
 use super::report::finish;
@@ -11,7 +11,7 @@ use crate::output::{Outputs, blob_file, posterior_file};
 use crate::report::parameters;
 use clap::Args;
 use hallstage_calibration::words;
-use hallstage_input::log::{BadRows, ReadOptions};
+use hallstage_input::log::ReadOptions;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -27,9 +27,6 @@ pub(super) struct FitArgs {
     options: FitOptions,
     #[command(flatten)]
     pub(super) threads: Threads,
-    /// What to do with rows that cannot be used.
-    #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
-    bad_rows: BadRows,
     #[command(flatten)]
     report: super::report::Report,
     #[command(flatten)]
@@ -47,7 +44,6 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let job = Job {
         title: "Calibration certificate",
         order: order.map_err(HostError::from_mismatch)?,
-        bad_rows: args.bad_rows,
         out: Some(&args.out),
     };
     job.run((&args.logs, &args.report, &args.json))
@@ -58,7 +54,6 @@ pub(super) struct Job<'a> {
     /// Title of the page.
     pub(super) title: &'static str,
     pub(super) order: FitOrder,
-    pub(super) bad_rows: BadRows,
     /// Where the calibration goes, if it is kept.
     pub(super) out: Option<&'a Path>,
 }
@@ -71,11 +66,7 @@ impl Job<'_> {
     ) -> Result<(), HostError> {
         let started = Instant::now();
         let stage = logs.stage.read()?;
-        let options = ReadOptions {
-            bad_rows: self.bad_rows,
-            ..ReadOptions::FIT
-        };
-        let log = logs.read(&stage, options)?;
+        let log = logs.read(&stage, ReadOptions::FIT)?;
         let outcome = terminal::timed("fit and diagnosis", || self.order.run(&log, &stage));
         let outcome = outcome.map_err(HostError::from_calibrate)?;
         let log_and_stage = (&log, &stage);

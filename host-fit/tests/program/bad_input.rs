@@ -37,6 +37,11 @@ fn what_cannot_be_read_is_named_with_its_place_and_nothing_is_written() {
     }
     let bench = Bench::new();
     bench.bad(FIT, 3, &["log.csv", "no such file"]);
+    bench.bad(
+        "fit log.csv --out p.bin --stage none.toml",
+        3,
+        &["none.toml", "host-fit init"],
+    );
     std::fs::create_dir(bench.path("log.csv")).expect("a folder");
     bench.bad(FIT, 3, &["log.csv", "a folder"]);
 }
@@ -71,6 +76,18 @@ fn a_blob_of_other_scales_is_refused() {
         bench.bad("decode p.bin log.csv --out pose.csv", 3, &[key]);
     }
     assert!(bench.holds_only(&["log.csv", "p.bin"]));
+}
+
+#[test]
+fn every_command_that_judges_a_log_skips_bad_rows() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --out p.bin");
+    bench.write("log.csv", with_cell(&log(), 10, "hall_b_cnt", "ice"));
+    for command in ["check log.csv", "eval p.bin log.csv"] {
+        bench.bad(command, 3, &["hall_b_cnt", "ice"]);
+        bench.good(&format!("{command} --bad-rows skip"));
+    }
 }
 
 #[test]
