@@ -186,7 +186,11 @@ impl Report {
         let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
         let of_31 = estimate.parameters.model_31();
         let mut warnings = words::messages(&log.warnings);
-        warnings.extend(words::messages(&fit.warnings(dataset, stage)));
+        warnings.extend(words::messages(&fit.warnings(
+            dataset,
+            stage,
+            diagnosis.predicted.as_ref(),
+        )));
         let mut report = Self::from_judgement(Judged {
             set: &fit.set,
             judgement: &fit.judgement,

@@ -303,7 +303,9 @@ impl Diagnosis {
         let is_late = findings
             .iter()
             .any(|found| found.code() == Code::ReferenceLag);
-        let warnings = fit.warnings(dataset, stage).into_iter();
+        let warnings = fit
+            .warnings(dataset, stage, self.predicted.as_ref())
+            .into_iter();
         let warnings = warnings.filter(|found| !is_late || found.code() != Code::ReferenceLag);
         findings.extend(warnings);
         findings.extend(temperature::findings(fit, dataset, stage));

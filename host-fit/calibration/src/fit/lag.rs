@@ -49,8 +49,7 @@ pub(super) fn without_lag(
 }
 
 fn is_clear(found: &Fit, stage: &Stage) -> bool {
-    (found.estimate.lag.as_ref())
-        .is_some_and(|lag| warning::late_reference(lag, stage.servo_period_s).is_some())
+    (found.estimate.lag.as_ref()).is_some_and(|lag| warning::is_clear(lag, stage))
 }
 
 /// Fits again until no lag remains.

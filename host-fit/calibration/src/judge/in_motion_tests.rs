@@ -6,7 +6,7 @@ use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
 use crate::plan::run::PlannedRun;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::Code;
+use hallstage_input::finding::{Code, Finding};
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
 use hallstage_simulate::dynamics::Dynamics;
@@ -40,7 +40,7 @@ fn calibrated(dynamics: Dynamics) -> (Stage, Fit, Diagnosis, Dataset) {
     };
     let run = log(two_tones(&stage));
     let fast = log(Protocol::Fast.run(period_s, SEED));
-    let motion = planar_motion(&fast);
+    let motion = planar_motion(&fast, &vec![true; fast.rows.len()]);
     let rms = |derivative: usize, axis: usize| {
         let squares = motion.iter().map(|row| row[derivative][axis].powi(2));
         (squares.sum::<f64>() / motion.len() as f64).sqrt()
@@ -91,5 +91,46 @@ fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
             );
             assert!(left < 1.03, "{axis}: {left}");
         }
+        let correction = bent.set.motion_correction.expect("a correction");
+        let row = fast.rows.len() / 2;
+        let mut spiked = fast.clone();
+        spiked.rows[row].reference[0] += 1e-3;
+        let [mut sound, mut bent] = [&fast, &spiked].map(|log| {
+            let decoded = Decoded::new(&bent.set, log);
+            decoded.corrected(&correction, log).errors
+        });
+        (sound[row], bent[row]) = (None, None);
+        for (sound, bent) in sound.iter().flatten().zip(bent.iter().flatten()) {
+            let off = (0..3).map(|axis| (sound[axis] - bent[axis]).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-6, "{sound:?} {bent:?}");
+        }
     }
+}
+
+#[test]
+fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
+    let calibrated = [[0.0; 3], [1.8e-4; 3]].map(|lags_s| {
+        let (stage, fit, diagnosis, fast) = calibrated(Dynamics::draw(lags_s, None, None, SEED));
+        (errors(&stage, &fit, &fast)[1], diagnosis)
+    });
+    let [(floor, sound), (late, diagnosis)] = calibrated;
+    assert!(sound.findings.is_empty(), "{:?}", sound.findings);
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+    let [found] = diagnosis.findings.as_slice() else {
+        panic!("{:?}", diagnosis.findings);
+    };
+    assert_eq!(found.code(), Code::ReferenceLag);
+    let worst = (0..3)
+        .map(|axis| late[axis] / floor[axis])
+        .fold(0.0, f64::max);
+    let cost = found.cost.expect("a cost");
+    assert!((cost / worst - 1.0).abs() < 0.1, "{cost} {worst}");
+}
+
+#[test]
+fn one_late_probe_is_told_once() {
+    let (_, _, diagnosis, _) = calibrated(Dynamics::draw([1e-3, 0.0, 0.0], None, None, SEED));
+    let codes: Vec<Code> = diagnosis.findings.iter().map(Finding::code).collect();
+    assert_eq!(codes, [Code::Motion], "{:?}", diagnosis.findings);
+    assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
 }

@@ -31,8 +31,10 @@ pub use judgement::{Judge, Judgement, LogJudgement};
 
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
+use hallstage_input::statistics::median;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
+use hallstage_solver::estimator::robust::{HALF, Loss};
 use hallstage_solver::estimator::rows::planar_motion;
 use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
@@ -94,7 +96,7 @@ impl Decoded {
     #[must_use]
     pub fn corrected(&self, correction: &MotionCorrection, dataset: &Dataset) -> Self {
         let mut corrected = self.clone();
-        let motion = planar_motion(dataset).into_iter();
+        let motion = planar_motion(dataset, &self.trusted(dataset)).into_iter();
         for (error, [speed, acceleration]) in corrected.errors.iter_mut().zip(motion) {
             for (axis, error) in error.iter_mut().flatten().enumerate() {
                 for k in 0..3 {
@@ -104,6 +106,30 @@ impl Decoded {
             }
         }
         corrected
+    }
+
+    /// The rows whose errors are near the errors around them: not those where the reference jumps for a moment.
+    fn trusted(&self, dataset: &Dataset) -> Vec<bool> {
+        const AROUND: usize = 2;
+        let jump = |row: usize| {
+            let rows = &dataset.movements[dataset.rows[row].movement].rows;
+            let around =
+                row.saturating_sub(AROUND).max(rows.start)..(row + AROUND + 1).min(rows.end);
+            let around = self.errors[around].iter().flatten();
+            let own = self.errors[row].unwrap_or_default();
+            let middle = |axis: usize| {
+                let mut errors: Vec<f64> = around.clone().map(|error| error[axis]).collect();
+                median(&mut errors).unwrap_or_default()
+            };
+            std::array::from_fn(|axis| own[axis] - middle(axis))
+        };
+        let jumps = (0..self.errors.len()).into_par_iter().map(jump).collect();
+        let movements = dataset
+            .movements
+            .iter()
+            .map(|movement| movement.rows.clone());
+        let weights = Loss::Cauchy.weights(jumps, movements);
+        weights.into_iter().map(|weight| weight >= HALF).collect()
     }
 
     /// The figures with these zero deviations taken off.

@@ -100,8 +100,8 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {}, which the errors leave out", counted(*rows, "row")),
         Kind::LateReference { lag_us, periods } => {
-            let (lag_us, periods, way) = (lag_us.abs(), periods.abs(), way(*lag_us));
-            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account, but the log does not show which of them is late. If all probes are late, the pose is late in service")
+            let (lag_us, periods, way, cost) = (lag_us.abs(), periods.abs(), way(*lag_us), found.cost);
+            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account, but the log does not show which of them is late. If it is the reference, the calibration is right. If all probes are late, the pose is late in service{}", cost.map_or(String::new(), |cost| format!(": with errors of {cost:.2} times the noise floor in the motion that [motion] in stage.toml declares")))
         }
         Kind::AtLimit { parameter, shown: (value, unit), .. } => {
             format!("the parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})")

@@ -3,7 +3,7 @@
 use super::causes::mistake_remedy;
 use super::evidence::{SENSORS, evidence};
 use super::sentence;
-use hallstage_input::finding::{Finding, Kind, Place};
+use hallstage_input::finding::{Code, Finding, Kind, Place};
 
 /// The message.
 pub fn message(found: &Finding) -> String {
@@ -14,7 +14,10 @@ pub fn message(found: &Finding) -> String {
     if let Some([rows, all]) = found.sample {
         text += &format!(" This is from {rows} of {all} rows.");
     }
-    if found.is_repaired {
+    let is_beam = found.channels().iter().all(|channel| channel.is_beam());
+    if found.is_repaired && found.code() == Code::ReferenceLag && !is_beam {
+        text += " The parameters are free of this lag. In service the channel stays late.";
+    } else if found.is_repaired {
         text += " The calibration is free of this fault and describes the stage at the end of the log: zero the stage before use.";
     }
     match remedy(found) {
@@ -66,7 +69,7 @@ fn remedy(found: &Finding) -> String {
         Kind::OtherModel { .. } => "if all six axes move at once, take --model field or auto; else see the errors over the log in the report",
         Kind::PoorFit { .. } => "let the search run longer, or take the default solver",
         Kind::NotDescribed { .. } => "check the columns, the order and signs of the sensors, and the scales in stage.toml",
-        Kind::LateReference { .. } => "set the delay of the interferometers to zero",
+        Kind::LateReference { .. } => "find out which is late, and set its delay to zero",
         Kind::AtLimit { .. } => "check the scales and signs of that probe and of the beams; if they are right, widen the range in stage.toml",
         Kind::VerticalAtLimit { .. } => "check the order and the signs of the capacitive sensors in the log and in stage.toml",
         Kind::MovementsMissed { .. } => "use --draw stratified, or a larger --train",

@@ -306,12 +306,11 @@ fn acceleration(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
     second_derivatives(used.map(sample)).unwrap_or([0.0; 6])
 }
 
-/// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI.
-pub fn planar_motion(dataset: &Dataset) -> Vec<[[f64; 3]; 2]> {
-    let trusted = vec![true; dataset.rows.len()];
+/// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI. Only the `trusted` rows count.
+pub fn planar_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<[[f64; 3]; 2]> {
     let at = |index: usize| {
-        let [x, y, rz, ..] = speed(dataset, index, &trusted);
-        let [by_x, by_y, by_rz, ..] = acceleration(dataset, index, &trusted);
+        let [x, y, rz, ..] = speed(dataset, index, trusted);
+        let [by_x, by_y, by_rz, ..] = acceleration(dataset, index, trusted);
         [[x, y, rz], [by_x, by_y, by_rz]]
     };
     (0..dataset.rows.len()).into_par_iter().map(at).collect()
