@@ -32,14 +32,14 @@ const STEPS: u32 = 6;
 /// unless both `errors` (SI, by name) are known.
 pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Group {
     let motion = sets.map(motion_parameters_in);
-    let [of_motion, other] = &motion;
-    let of_motion = if of_motion.is_empty() {
+    let [motion_figures, other] = &motion;
+    let motion_figures = if motion_figures.is_empty() {
         other
     } else {
-        of_motion
+        motion_figures
     }
     .iter();
-    let of_motion: Vec<_> = of_motion.map(|(name, _)| name.clone()).collect();
+    let motion_figures: Vec<_> = motion_figures.map(|(name, _)| name.clone()).collect();
     let [in_a, in_b] = [0, 1].map(|k| {
         let mut all = parameters_in(sets[k]);
         all.extend(temperature_parameters_in(sets[k]));
@@ -61,7 +61,7 @@ pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f6
         };
         (name, figures.into())
     };
-    let names = names(usize::MAX).into_iter().chain(of_motion);
+    let names = names(usize::MAX).into_iter().chain(motion_figures);
     let names = names.filter(|name| in_a.contains_key(name) || in_b.contains_key(name));
     Group(names.map(change).collect())
 }

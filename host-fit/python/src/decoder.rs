@@ -170,12 +170,13 @@ impl Decoder {
             temperature: temperature.as_deref(),
             first: 0,
         };
-        let of_row = |row: usize| {
+        let words_at = |row: usize| {
             let reading = self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO);
             uncertainty(&reading, &posterior)
         };
-        let found: Vec<[f64; 3]> =
-            work::run(py, || (0..hall.len()).into_par_iter().map(of_row).collect())?;
+        let found: Vec<[f64; 3]> = work::run(py, || {
+            (0..hall.len()).into_par_iter().map(words_at).collect()
+        })?;
         crate::log::rows_of_three(py, found)
     }
 

@@ -48,7 +48,7 @@ pub struct Evaluation {
     /// Errors of the rows, zero deviations taken off.
     pub by_row: RowErrors,
     /// Over these.
-    of_rows: Judgement,
+    sampled: Judgement,
     /// Over these, with poses corrected by speed and acceleration; `None` for a blob without a correction.
     corrected: Option<PoseError>,
     zeros: Zeros<'static>,
@@ -88,12 +88,12 @@ impl Evaluation {
         let zeros = order.zeros.unwrap_or(own_zeros);
         let judgement = judge.clone().judgement(zeros);
         let decoded = Decoded::new(set, &log.dataset);
-        let of_rows = decoded.judge(&log.dataset, stage, zeros);
+        let sampled = decoded.judge(&log.dataset, stage, zeros);
         let corrected = set.motion_correction.as_ref().map(|correction| {
             let corrected = decoded.corrected(correction, &log.dataset);
             corrected.judge(&log.dataset, stage, zeros).errors
         });
-        let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
+        let by_row = decoded.errors_less(&sampled.zeros, &log.dataset);
         let is_refitted = zeros == Zeros::Refit;
         let blob_use = BlobUse::Evaluated { is_refitted };
         let mut diagnosis = diagnose_blob(&log.dataset, stage, set, blob_use);
@@ -123,7 +123,7 @@ impl Evaluation {
             judgement,
             diagnosis,
             by_row,
-            of_rows,
+            sampled,
             corrected,
             zeros,
             limit,
@@ -140,7 +140,7 @@ impl Evaluation {
             judgement: &self.judgement,
             zeros: self.zeros,
             by_row: self.by_row.clone(),
-            over_rows: self.of_rows.errors,
+            over_rows: self.sampled.errors,
             stage: &self.stage,
             dataset: &self.log.dataset,
             skipped_rows: self.log.skipped_rows,

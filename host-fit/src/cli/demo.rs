@@ -119,8 +119,8 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let results = ["params.bin", "pose.csv", "field.bin", "field.bin.posterior"];
     let names = FILES.iter().map(|(name, _)| *name).chain(results);
     let files: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
-    let of_a_demo = fs::read(&files[3]).is_ok_and(|text| text == STAGE_TOML.as_bytes());
-    if let Some(file) = files.iter().find(|file| file.exists() && !of_a_demo) {
+    let is_demo = fs::read(&files[3]).is_ok_and(|text| text == STAGE_TOML.as_bytes());
+    if let Some(file) = files.iter().find(|file| file.exists() && !is_demo) {
         let there = file.display();
         let problem =
             format!("{there} is there already and is not of this demo; name another folder");
@@ -216,12 +216,12 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         ("designed", parameters::designed(&stage)),
         ("paper", table_7()),
     ];
-    let of_fit = parameters(
+    let fit_table = parameters(
         model_31.model,
         &model_31.estimate.parameters.model_31(),
         &model_31.estimate.posterior.standard_errors_31(),
     );
-    let mut tables = parameters::tables(&of_fit, &beside);
+    let mut tables = parameters::tables(&fit_table, &beside);
     for table in &mut tables {
         table.title =
             "Table 7: parameters (lever arms in place of H, which no data can separate)".to_owned();

@@ -155,11 +155,11 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
 
 /// Whether Ctrl-C ended the work.
 fn is_interrupted(error: &(dyn Error + 'static)) -> bool {
-    let of_import = match error.downcast_ref() {
+    let import_error = match error.downcast_ref() {
         Some(ImportError::Log(error)) => Some(error),
         _ => None,
     };
-    let log: Option<&LogError> = error.downcast_ref().or(of_import);
+    let log: Option<&LogError> = error.downcast_ref().or(import_error);
     let dialog = match error.downcast_ref() {
         Some(UpdateRunError::Dialog { cause, .. }) => Some(cause),
         _ => None,

@@ -163,7 +163,7 @@ pub fn tables(
 ) -> Vec<Table> {
     let titles = beside.iter().map(|(title, _)| *title);
     let columns: Vec<&str> = [""].into_iter().chain(titles).collect();
-    let of_31 = probe_table("parameters", 0..BEYOND_MODEL_31, &columns, |name, unit| {
+    let model_31_table = probe_table("parameters", 0..BEYOND_MODEL_31, &columns, |name, unit| {
         let beside = beside.iter().map(|(_, values)| {
             let value = values.get(name);
             value.map_or(Figure::None, |x| bare(*x, unit))
@@ -177,7 +177,7 @@ pub fn tables(
         &[""],
         |name, _| Some(vec![Figure::from(*parameters.get(name)?)]),
     );
-    let tables = [of_31, beyond].into_iter();
+    let tables = [model_31_table, beyond].into_iter();
     tables.filter(|table| !table.rows.is_empty()).collect()
 }
 

@@ -65,10 +65,10 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
     let errors = plan.forecast.posterior.standard_errors();
     let parameter = |k: usize| {
         let unit = TERMS[k % PER_PROBE].unit;
-        let of_prior = over_prior(&errors, k);
+        let prior_share = over_prior(&errors, k);
         (
             name(k),
-            json!({ "standard_error": errors[k], "unit": unit, "of_prior": of_prior }),
+            json!({ "standard_error": errors[k], "unit": unit, "of_prior": prior_share }),
         )
     };
     let mut worst: Vec<(f64, usize)> = (0..COUNT)
@@ -170,9 +170,12 @@ pub fn tables(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Vec<Table> {
     let title = "standard errors predicted";
     let errors = probe_table(title, 0..PER_PROBE, &["", "of prior"], |name, unit| {
         let k = index(name)?;
-        let of_prior = over_prior(&standard_errors, k);
-        let of_prior = of_prior.map_or(Figure::None, |x| rounded(x, 2).into());
-        Some(vec![bare(rounded(standard_errors[k], 2), unit), of_prior])
+        let prior_share = over_prior(&standard_errors, k);
+        let prior_share = prior_share.map_or(Figure::None, |x| rounded(x, 2).into());
+        Some(vec![
+            bare(rounded(standard_errors[k], 2), unit),
+            prior_share,
+        ])
     });
     let mut all = figures(plan, protocol, stage).tables();
     all.splice(1..1, [moves]);

@@ -184,7 +184,7 @@ impl Report {
             None => (settings.solver, settings.options.projection),
         };
         let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
-        let of_31 = estimate.parameters.model_31();
+        let model_31 = estimate.parameters.model_31();
         let mut warnings = words::messages(&log.warnings);
         warnings.extend(words::messages(&fit.warnings(
             dataset,
@@ -214,12 +214,12 @@ impl Report {
                 "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior",
             ),
             None => (
-                parameters(fit.model, &of_31, &posterior.standard_errors_31()),
+                parameters(fit.model, &model_31, &posterior.standard_errors_31()),
                 "sandwich over movements, or blocks of 0.5 s where there are fewer than 20; it includes drift, not what the model lacks",
             ),
         };
         report.parameters = parameters;
-        let places_m = of_31.nearest_places_m(stage);
+        let places_m = model_31.nearest_places_m(stage);
         let lag = estimate.lag.map(|lag| {
             let value = figure(lag.value_s * 1e6, "us");
             group! {

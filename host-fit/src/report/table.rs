@@ -124,18 +124,18 @@ impl Table {
             let first = units.next().unwrap_or_default();
             units.all(|unit| unit == first).then_some(first)
         };
-        let of_rows: Option<Vec<&str>> = self
+        let row_units: Option<Vec<&str>> = self
             .rows
             .iter()
             .map(|(_, row)| unit(&mut row.iter()))
             .collect();
-        let of_rows = of_rows.filter(|units| units.iter().any(|unit| !unit.is_empty()));
+        let row_units = row_units.filter(|units| units.iter().any(|unit| !unit.is_empty()));
         let column = |k: usize| self.rows.iter().filter_map(move |(_, row)| row.get(k));
         let titled = |(k, title): (usize, &String)| match k
             .checked_sub(1)
             .and_then(|k| unit(&mut column(k)))
         {
-            Some(unit) if !unit.is_empty() && of_rows.is_none() => format!("{title}, {unit}"),
+            Some(unit) if !unit.is_empty() && row_units.is_none() => format!("{title}, {unit}"),
             _ => title.clone(),
         };
         let mut titles: Vec<String> = self.columns.iter().enumerate().map(titled).collect();
@@ -145,7 +145,7 @@ impl Table {
             .collect();
         let row = |(k, (name, figures)): (usize, &(String, Vec<Figure>))| {
             let cells = std::iter::once(name.clone()).chain(figures.iter().map(text));
-            let unit = of_rows.as_ref().map(|units| units[k].to_owned());
+            let unit = row_units.as_ref().map(|units| units[k].to_owned());
             cells
                 .chain(unit)
                 .chain(self.remarks.get(k).cloned())
@@ -153,7 +153,7 @@ impl Table {
         };
         let rows = self.rows.iter().enumerate().map(row).collect();
         let more = [
-            (of_rows.is_some(), "unit"),
+            (row_units.is_some(), "unit"),
             (!self.remarks.is_empty(), "meaning"),
         ];
         for (_, title) in more.into_iter().filter(|(is_there, _)| *is_there) {

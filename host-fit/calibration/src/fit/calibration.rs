@@ -22,17 +22,17 @@ pub fn calibration<'r>(
     parameters: &FieldParameters,
 ) -> Result<Calibration, ParameterError> {
     let (planar, vertical) = reach(rows);
-    let of_31 = parameters.model_31();
+    let model_31 = parameters.model_31();
     let probes = match model {
         ModelKind::Field => {
             let constants = parameters.constants(stage.hall.m_per_count);
             Probes::Field(constants.ok_or(ParameterError::SingularPlane)?.probes)
         }
-        _ => Probes::Linear(of_31.sensitivity()),
+        _ => Probes::Linear(model_31.sensitivity()),
     };
     Ok(Calibration {
         model,
-        geometry: of_31.geometry(),
+        geometry: model_31.geometry(),
         probes,
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,

@@ -29,11 +29,11 @@ pub(super) fn without_lag(
         // A lag of many rows is more than the field model can follow: Model (31) finds it.
         (Err(FitError::Field(error)), ModelChoice::Named(_)) => {
             let model = ModelChoice::Named(Model::from_kind(ModelKind::M31));
-            let of_31 = FitSettings {
+            let with_model_31 = FitSettings {
                 model,
                 ..settings.clone()
             };
-            let found = fit_once(dataset, stage, &of_31).ok();
+            let found = fit_once(dataset, stage, &with_model_31).ok();
             let found = found.filter(|found| is_clear(found, stage));
             return match found {
                 Some(found) => again(found, dataset, stage, settings),
@@ -118,11 +118,11 @@ pub(crate) fn with_beams_later(dataset: &Dataset, later_s: [f64; 3], half_m: f64
         }
     }
     for (log, source) in out.logs.iter_mut().enumerate() {
-        let of_log = || out.movements.iter().filter(|movement| movement.log == log);
-        let start = of_log().next().map_or(0, |movement| movement.rows.start);
-        let end = of_log().next_back().map_or(0, |movement| movement.rows.end);
+        let own = || out.movements.iter().filter(|movement| movement.log == log);
+        let start = own().next().map_or(0, |movement| movement.rows.start);
+        let end = own().next_back().map_or(0, |movement| movement.rows.end);
         source.rows = start..end;
-        (source.rows_read, source.movements_read) = (end - start, of_log().count());
+        (source.rows_read, source.movements_read) = (end - start, own().count());
     }
     out
 }

@@ -143,14 +143,14 @@ impl<'s> Judge<'s> {
             }
             total.add(&sums);
         }
-        let of_log = |sums: &ErrorSums| LogJudgement {
+        let log_judgement = |sums: &ErrorSums| LogJudgement {
             rows: sums.rows + sums.undecoded,
             errors: sums.errors(),
         };
         let setting = |of: &OfMovement| of.vertical.map(|sum| sum / of.movement.rows.len() as f64);
         Judgement {
             errors: total.errors(),
-            logs: logs.iter().map(of_log).collect(),
+            logs: logs.iter().map(log_judgement).collect(),
             settings: self.movements.iter().map(setting).collect(),
             by_movement,
             movements: self.movements.into_iter().map(|of| of.movement).collect(),

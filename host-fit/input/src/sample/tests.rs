@@ -93,12 +93,12 @@ fn a_long_log_is_sampled_in_unchanged_runs() {
     assert_eq!(found, [(Code::Excerpt, Some(taken as f64))]);
     for (number, run) in dataset.movements.iter().enumerate() {
         let rows = &dataset.rows[run.rows.clone()];
-        let of_log = all.dataset.movements[run.index as usize].rows.clone();
-        let of_log = &all.dataset.rows[of_log];
-        let first = of_log.partition_point(|row| row.t_us < rows[0].t_us);
+        let log_rows = all.dataset.movements[run.index as usize].rows.clone();
+        let log_rows = &all.dataset.rows[log_rows];
+        let first = log_rows.partition_point(|row| row.t_us < rows[0].t_us);
         assert_eq!(rows.len(), RUN);
-        for (have, want) in rows.iter().zip(&of_log[first..]) {
-            let sequence = want.frame.sequence() - of_log[first].frame.sequence();
+        for (have, want) in rows.iter().zip(&log_rows[first..]) {
+            let sequence = want.frame.sequence() - log_rows[first].frame.sequence();
             let want = Row {
                 movement: number,
                 frame: want.frame.with_sequence(sequence),

@@ -99,7 +99,7 @@ fn column<'d>(
     let name = named(document, &column)?;
     let known = kind.units();
     let si = kind.si();
-    let of_unit = |symbol: &str, value: &Value<'_>| {
+    let scale_of_unit = |symbol: &str, value: &Value<'_>| {
         let problem = |fault| match fault {
             UnitFault::NoVoltsPerCount => format!(
                 "the column is a voltage; give the converter's `volts_per_count` (V) in [{}]",
@@ -134,9 +134,9 @@ fn column<'d>(
             }
             given * per_si
         }
-        (Some(unit), None) => of_unit(unit.as_text().unwrap_or_default(), &unit)?,
+        (Some(unit), None) => scale_of_unit(unit.as_text().unwrap_or_default(), &unit)?,
         (None, None) if kind.unit_in_name(&name).is_some() => {
-            of_unit(units::split(&name).1.unwrap_or(&name), &column)?
+            scale_of_unit(units::split(&name).1.unwrap_or(&name), &column)?
         }
         (None, None) if si.is_some() => {
             let example = format!("{{ column = \"{name}\", unit = \"...\" }}");

@@ -84,10 +84,10 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
         ("hall", &HALL_PARTS, "h_per_k"),
     ];
     for (prior, (class, known, numbers)) in out.prior_per_k.iter_mut().zip(classes) {
-        let of_class = named(document, class, known)?;
-        *prior = of_class.unwrap_or(*prior);
+        let by_class = named(document, class, known)?;
+        *prior = by_class.unwrap_or(*prior);
         if let Some(list) = document.get(TABLE, numbers) {
-            if of_class.is_some() {
+            if by_class.is_some() {
                 return twice(class, numbers);
             }
             for (k, (out, number)) in prior.iter_mut().zip(list.items()).enumerate() {

@@ -38,13 +38,13 @@ impl Rows {
         dynamics: &Dynamics,
         offsets_mm: &[[f64; 3]],
     ) -> Vec<Block> {
-        let of_movement = |(movement, &offset_mm): (usize, &[f64; 3])| {
+        let in_movement = |(movement, &offset_mm): (usize, &[f64; 3])| {
             self.evaluate_movement(movement, probes, dynamics, offset_mm)
         };
         offsets_mm
             .par_iter()
             .enumerate()
-            .flat_map(of_movement)
+            .flat_map(in_movement)
             .collect()
     }
 
@@ -70,7 +70,7 @@ impl Rows {
         dynamics: &Dynamics,
         offsets_mm: &[[f64; 3]],
     ) -> Vec<[f64; 3]> {
-        let of_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
+        let in_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
             let residual = move |row: &FieldRow| {
                 [0, 1, 2].map(|k| {
                     let [planar_mm, vertical] = row.pose(dynamics, k, offset);
@@ -82,7 +82,7 @@ impl Rows {
             self.rows[range].par_iter().with_min_len(256).map(residual)
         };
         let movements: Vec<_> = self.movement_rows().zip(offsets_mm).collect();
-        movements.into_par_iter().flat_map(of_movement).collect()
+        movements.into_par_iter().flat_map(in_movement).collect()
     }
 }
 

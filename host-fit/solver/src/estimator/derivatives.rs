@@ -28,9 +28,9 @@ pub fn second_derivatives<const N: usize>(
         return None;
     }
     let squares = SMatrix::<f64, 5, 5>::from_fn(|i, k| moments[i + k]);
-    let mut of_square = SVector::<f64, 5>::zeros();
-    of_square[2] = 2.0 / (half_s * half_s);
-    let c = squares.cholesky()?.solve(&of_square);
+    let mut wanted = SVector::<f64, 5>::zeros();
+    wanted[2] = 2.0 / (half_s * half_s);
+    let c = squares.cholesky()?.solve(&wanted);
     let mut sum = [0.0; N];
     for (t_s, values) in samples {
         let t = t_s / half_s;

@@ -104,13 +104,13 @@ impl MotionFit {
     /// From the values and the covariance of a fit of the field model.
     pub fn new(values: &[f64], covariance: &DMatrix<f64>, shows_acceleration: bool) -> Self {
         let lags = covariance.fixed_view::<2, 2>(PROBE_LAGS, PROBE_LAGS);
-        let of_axis =
+        let axis_covariance =
             |axis: usize| Matrix3::from_fn(|i, k| covariance[(column(i, axis), column(k, axis))]);
         Self {
             dynamics: Dynamics::from_values(values),
             probe_lag_covariance: three_lags(lags.into()),
             acceleration_covariance: match shows_acceleration {
-                true => std::array::from_fn(of_axis),
+                true => std::array::from_fn(axis_covariance),
                 false => Self::unknown().acceleration_covariance,
             },
             shows_acceleration,

@@ -295,10 +295,10 @@ impl WhiteFit {
         let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
         let signal_to_noise = mean_square / (white_mm * white_mm);
         self.sensors.complete(&mut covariance, signal_to_noise);
-        let of_parameters = self.posterior(&covariance);
+        let parameters_only = self.posterior(&covariance);
         let posterior = match temperature.is_used() {
-            true => of_parameters.with_temperature(&covariance),
-            false => of_parameters,
+            true => parameters_only.with_temperature(&covariance),
+            false => parameters_only,
         };
         let temperature = TemperatureFit {
             temperature,

@@ -53,11 +53,11 @@ impl<const W: usize> Normal<W> {
 
     /// The sum over `count` movements, in their order for any number of threads; `None` if a movement cannot be
     /// evaluated.
-    pub fn sum(count: usize, of_movement: impl Fn(usize) -> Option<Self> + Sync) -> Option<Self> {
+    pub fn sum(count: usize, movement_sums: impl Fn(usize) -> Option<Self> + Sync) -> Option<Self> {
         let mut sum = Self::none();
         for start in (0..count).step_by(TOGETHER) {
             let some = start..(start + TOGETHER).min(count);
-            let some: Vec<Option<Self>> = some.into_par_iter().map(&of_movement).collect();
+            let some: Vec<Option<Self>> = some.into_par_iter().map(&movement_sums).collect();
             for movement in some {
                 sum.add(movement?);
             }
@@ -168,15 +168,15 @@ impl Unknowns {
 
     /// Half the fall of the sum of squares along x.
     pub fn descent<const W: usize>(&self, normal: &Normal<W>, x: &DVector<f64>) -> DVector<f64> {
-        let of_values = DVector::from_fn(self.origin.len(), |k, _| normal.descent(k));
-        self.basis.tr_mul(&of_values) - &self.prior * x
+        let by_values = DVector::from_fn(self.origin.len(), |k, _| normal.descent(k));
+        self.basis.tr_mul(&by_values) - &self.prior * x
     }
 
     /// The curvature along x.
     pub fn curvature<const W: usize>(&self, normal: &Normal<W>) -> DMatrix<f64> {
         let n = self.origin.len();
-        let of_values = DMatrix::from_fn(n, n, |i, j| normal.curvature(i, j));
-        self.basis.tr_mul(&(of_values * &self.basis)) + &self.prior
+        let by_values = DMatrix::from_fn(n, n, |i, j| normal.curvature(i, j));
+        self.basis.tr_mul(&(by_values * &self.basis)) + &self.prior
     }
 
     /// The factored curvature; `None` where it is singular.
@@ -208,8 +208,9 @@ impl Unknowns {
         // Each round holds or releases one unknown. This number of rounds is enough but for rounding.
         for _ in 0..=3 * x.len() {
             let free: Vec<usize> = (0..x.len()).filter(|&k| !held[k]).collect();
-            let of_held = DVector::from_fn(x.len(), |k, _| f64::from(u8::from(held[k])) * step[k]);
-            let pull = (descent - &damped * of_held).select_rows(&free);
+            let held_step =
+                DVector::from_fn(x.len(), |k, _| f64::from(u8::from(held[k])) * step[k]);
+            let pull = (descent - &damped * held_step).select_rows(&free);
             let part = curvature.select_rows(&free).select_columns(&free);
             let target = Factor::new(&part, damping)?.solve(&pull);
             let way = |(&k, target): (&usize, &f64)| (k, target - step[k]);

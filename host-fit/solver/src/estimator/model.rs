@@ -87,8 +87,9 @@ impl Model {
 
     /// The parameters in the order of every list: each term for A, B, C.
     pub fn parameters(&'static self) -> impl Iterator<Item = ParameterId> {
-        let of_term = |(place, term)| (0..3).map(move |probe| ParameterId::new(place, term, probe));
-        MODEL_31.iter().enumerate().flat_map(of_term)
+        let with_probes =
+            |(place, term)| (0..3).map(move |probe| ParameterId::new(place, term, probe));
+        MODEL_31.iter().enumerate().flat_map(with_probes)
     }
 
     /// The parameters that the model fits.

@@ -30,8 +30,8 @@ pub fn white_mm(
     let residuals = rows.residuals_mm(probes, dynamics, offsets_mm);
     let mut noise = SecondDifferences::default();
     for movement in rows.movement_rows() {
-        let of_rows = residuals[movement.clone()].windows(3);
-        for (three, rows) in of_rows.zip(rows.rows[movement].windows(3)) {
+        let triples = residuals[movement.clone()].windows(3);
+        for (three, rows) in triples.zip(rows.rows[movement].windows(3)) {
             if rows.iter().all(|row| row.weight >= HALF) {
                 noise.add(three[0], three[1], three[2]);
             }

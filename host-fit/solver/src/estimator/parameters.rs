@@ -182,7 +182,7 @@ pub fn values_of(set: &ParameterSet) -> Option<[[f64; PER_PROBE]; 3]> {
         return None;
     };
     let m_per_code = f64::from(set.hall.m_per_code);
-    let of_probe = |k: usize| {
+    let probe_values = |k: usize| {
         let FieldProbe {
             sensitivity: s,
             carry,
@@ -201,7 +201,7 @@ pub fn values_of(set: &ParameterSet) -> Option<[[f64; PER_PROBE]; 3]> {
         }
         values
     };
-    Some([of_probe(0), of_probe(1), of_probe(2)])
+    Some([probe_values(0), probe_values(1), probe_values(2)])
 }
 
 fn sensitivity(values: &[f64; PER_PROBE]) -> Sensitivity<f64> {

@@ -259,13 +259,13 @@ mod tests {
                 posterior.at_pose(planar, vertical).expect("a pose")
             };
             // Errors of the form act as the noise of the probes does.
-            let of_form = at_pose(DMatrix::zeros(UNKNOWNS, UNKNOWNS));
-            let of_noise = of_form.noise * (FORM_MM / noise.white_mm[0]).powi(2);
-            assert!((of_form.systematic - of_noise).norm() < 1e-9 * of_noise.norm());
-            let of_parameter = at_pose(covariance).systematic - of_form.systematic;
+            let form_only = at_pose(DMatrix::zeros(UNKNOWNS, UNKNOWNS));
+            let form_noise = form_only.noise * (FORM_MM / noise.white_mm[0]).powi(2);
+            assert!((form_only.systematic - form_noise).norm() < 1e-9 * form_noise.norm());
+            let parameters_only = at_pose(covariance).systematic - form_only.systematic;
             for axis in 0..3 {
                 let found = 0.5 * (up[axis] - down[axis]).abs();
-                let predicted = of_parameter[(axis, axis)].max(0.0).sqrt();
+                let predicted = parameters_only[(axis, axis)].max(0.0).sqrt();
                 let close = (found - predicted).abs() <= 1e-2 * found + 1e-12;
                 assert!(close, "{} {axis}: {found:e} {predicted:e}", name(k));
             }

@@ -319,8 +319,8 @@ pub fn planar_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<[[f64; 3]; 2]> 
 /// How far a movement moves: the largest range of X, Y (mm) and Rz (mrad) by the reference.
 fn moved_mm(rows: &[FieldRow]) -> f64 {
     let span = |axis: usize| {
-        let of_axis = rows.iter().map(|row| row.reference_mm[axis]);
-        stage::Range::around(of_axis).width()
+        let references = rows.iter().map(|row| row.reference_mm[axis]);
+        stage::Range::around(references).width()
     };
     (0..3).map(span).fold(0.0, f64::max)
 }

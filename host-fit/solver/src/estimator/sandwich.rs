@@ -95,9 +95,9 @@ impl Sandwich {
         });
         let place = |&index: &usize| index % 3 * PER_PROBE + index / 3;
         let places = determined.iter().map(place).collect();
-        let of_31 = FieldParameters::from_model_31(parameters, problem.stage);
+        let model_31 = FieldParameters::from_model_31(parameters, problem.stage);
         Some(Self {
-            posterior: Posterior::from_sandwich(places, covariance, &of_31),
+            posterior: Posterior::from_sandwich(places, covariance, &model_31),
             motion_error: std::array::from_fn(|k| errors.independent[k]),
             undetermined: (problem.model.free())
                 .filter(|id| errors.undetermined.contains(&id.index))
@@ -145,7 +145,7 @@ impl Sums {
             (BLOCK_S / problem.stage.servo_period_s).ceil().max(1.0) as usize
         };
         let rows_of = |movement: usize| &problem.rows.rows[movements[movement].clone()];
-        let of_movement = |movement: usize| {
+        let movement_sums = |movement: usize| {
             let rows = rows_of(movement);
             let mean = decoder.mean(problem, rows)?;
             let mut covariance = Matrix3::zeros();
@@ -170,7 +170,7 @@ impl Sums {
         };
         let found: Option<Vec<_>> = (0..movements.len())
             .into_par_iter()
-            .map(of_movement)
+            .map(movement_sums)
             .collect();
         let mut sums = Self {
             normal: problem.normal(&at)?,
@@ -181,8 +181,8 @@ impl Sums {
             zeros: 3 * movements.len() * usize::from(problem.model.has_zero_deviation),
         };
         let mut covariance = Matrix3::zeros();
-        for (of_movement, scores) in found? {
-            covariance += of_movement / problem.rows.rows.len() as f64;
+        for (movement_sums, scores) in found? {
+            covariance += movement_sums / problem.rows.rows.len() as f64;
             sums.clusters += scores.len();
             for score in scores {
                 sums.clustered.ger(1.0, &score, &score, 1.0);

@@ -218,8 +218,8 @@ impl ServiceVariance {
     /// Whether the worst axis is better than the worst axis of Model (31). The difference between the models is taken
     /// less its systematic part.
     fn is_better(&self) -> bool {
-        let of_31 = |k: usize| (self.difference[k] - self.systematic[k]) / self.noise[k];
-        (0..3).any(|k| of_31(k) > self.worst())
+        let model_31_error = |k: usize| (self.difference[k] - self.systematic[k]) / self.noise[k];
+        (0..3).any(|k| model_31_error(k) > self.worst())
     }
 }
 

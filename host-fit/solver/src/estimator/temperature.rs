@@ -128,16 +128,16 @@ impl Sensors {
             normal += along * along.transpose() * (rows * signal_to_noise);
         }
         let inverse = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
-        let mut of_sensors = Matrix3::zeros();
+        let mut sensor_noise = Matrix3::zeros();
         for (rows, change_k) in &self.by_log {
             let error = inverse * along(*change_k) * (rows * signal_to_noise * OF_SENSORS);
-            of_sensors += error * error.transpose();
+            sensor_noise += error * error.transpose();
         }
         for coefficient in Coefficient::ALL {
             let (i, sensor) = (coefficient.row(), coefficient.sensor);
             for other in Coefficient::ALL {
                 let j = other.row();
-                covariance[(i, j)] += of_sensors[(1 + sensor, 1 + other.sensor)];
+                covariance[(i, j)] += sensor_noise[(1 + sensor, 1 + other.sensor)];
             }
             let other = Coefficient::new(coefficient.probe, 1 - sensor).row();
             let together = OF_FORM_TOGETHER * OF_FORM_TOGETHER;
@@ -159,10 +159,10 @@ impl Sensors {
 /// The range of a log that spans enough, else of the means of several logs. 0 where the errors of the sensors are
 /// too large to improve on the prior, `deviation`.
 fn span_k(dataset: &Dataset, sensor: usize, deviation: f64) -> f64 {
-    let of_logs = || dataset.logs.iter().map(|log| log.rows.clone());
+    let log_rows = || dataset.logs.iter().map(|log| log.rows.clone());
     let range_k = |ends: Option<[i32; 2]>| ends.map_or(0.0, |[a, b]| f64::from(b - a) * 1e-3);
-    let within = of_logs().map(|rows| range_k(dataset.temperature_range_mc(sensor, rows)));
-    let means = of_logs().filter_map(|rows| dataset.temperature_mean_mc(sensor, rows));
+    let within = log_rows().map(|rows| range_k(dataset.temperature_range_mc(sensor, rows)));
+    let means = log_rows().filter_map(|rows| dataset.temperature_mean_mc(sensor, rows));
     let ends = means.fold([i32::MAX, i32::MIN], |[low, high], mean| {
         [low.min(mean), high.max(mean)]
     });
@@ -171,8 +171,8 @@ fn span_k(dataset: &Dataset, sensor: usize, deviation: f64) -> f64 {
     } else {
         range_k(Some(ends).filter(|[low, high]| low < high))
     };
-    let of_two_logs = OF_SENSORS * f64::sqrt(2.0);
-    if of_two_logs < deviation * span_k {
+    let two_logs = OF_SENSORS * f64::sqrt(2.0);
+    if two_logs < deviation * span_k {
         span_k
     } else {
         0.0

@@ -160,11 +160,11 @@ fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
     }
     if logs == 2 {
         let whole = dataset.logs[0].clone();
-        let of_rows = |rows| LogSource {
+        let with_rows = |rows| LogSource {
             rows,
             ..whole.clone()
         };
-        dataset.logs = vec![of_rows(0..cold), of_rows(cold..whole.rows.end)];
+        dataset.logs = vec![with_rows(0..cold), with_rows(cold..whole.rows.end)];
     }
     dataset.compensate_as_expected(&stage().temperature);
     dataset

@@ -47,10 +47,10 @@ const THETA_RAD: f64 = 0.02;
 const SLOPE: f64 = 0.05;
 /// Deviation of b and of c: a times this lever.
 const PLACE_M: f64 = 5e-3;
-const OF_PRIOR: f64 = 0.2;
+const PRIOR_SHARE: f64 = 0.2;
 const LAG_S: f64 = 0.01;
 /// Columns of the lags of the reference and of two probes, and of what acceleration adds.
-const OF_MOTION: usize = 3 + UNKNOWNS - ACCELERATIONS;
+const MOTION_COLUMNS: usize = 3 + UNKNOWNS - ACCELERATIONS;
 
 impl Change {
     /// The columns of L for it, each over the parameters.
@@ -100,7 +100,7 @@ fn seating(probe: usize, values: &[f64; PER_PROBE]) -> Vec<[f64; COUNT]> {
         one(SLOPES + 2, place),
     ];
     for (k, term) in TERMS.iter().enumerate() {
-        columns.extend(term.prior.map(|prior| one(k, OF_PRIOR * prior)));
+        columns.extend(term.prior.map(|prior| one(k, PRIOR_SHARE * prior)));
     }
     columns
 }
@@ -206,7 +206,7 @@ pub fn update(
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {
         // The errors of the temperatures belong to this log only. Their column is the last before the columns of motion.
-        lasting.column_mut(changes - OF_MOTION - 1).fill(0.0);
+        lasting.column_mut(changes - MOTION_COLUMNS - 1).fill(0.0);
     }
     let inverse = unknowns
         .factor(&solved.normal)
@@ -242,7 +242,7 @@ fn factor(
 ) -> Option<DMatrix<f64>> {
     let changes = change.columns(old);
     let known = covariance.map_or(0, DMatrix::nrows);
-    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + OF_MOTION);
+    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + MOTION_COLUMNS);
     if let Some(covariance) = covariance {
         // Scaled to a diagonal of ones: the units differ by orders of magnitude.
         let scale = covariance.diagonal().map(f64::sqrt);

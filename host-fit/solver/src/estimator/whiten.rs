@@ -154,10 +154,10 @@ impl FieldEquations<'_> {
                 }
             }
             innovations(&mut columns, block, &end);
-            let [of_a, of_b, of_c] = &columns;
+            let [row_a, row_b, row_c] = &columns;
             for (end, [a, b, c]) in end.iter_mut().zip(gain.kalman) {
                 for (j, end) in end.iter_mut().enumerate() {
-                    *end += (a * of_a[j] + b * of_b[j]) + c * of_c[j];
+                    *end += (a * row_a[j] + b * row_b[j]) + c * row_c[j];
                 }
             }
             spread = gain.spread;
@@ -259,8 +259,8 @@ impl Gain {
     fn whiten<const W: usize>(&self, columns: &mut [[f64; W]; 3]) {
         let l = &self.factor;
         let [first, second, third] = [1.0 / l[0][0], 1.0 / l[1][1], 1.0 / l[2][2]];
-        let [of_a, of_b, of_c] = columns;
-        for ((x, y), z) in of_a.iter_mut().zip(of_b).zip(of_c) {
+        let [row_a, row_b, row_c] = columns;
+        for ((x, y), z) in row_a.iter_mut().zip(row_b).zip(row_c) {
             *x *= first;
             *y = (*y - l[1][0] * *x) * second;
             *z = (*z - l[2][0] * *x - l[2][1] * *y) * third;
