@@ -76,7 +76,10 @@ impl StoredPosterior {
         let score = figures.score;
         Some(Self {
             covariance: fit.estimate.posterior.covariance.clone(),
-            noise: figures.noise,
+            noise: Noise {
+                white_mm: fit.estimate.posterior.white_mm,
+                ..figures.noise
+            },
             misfit: score.chi_squared / score.residuals.max(1) as f64,
             repaired: Vec::new(),
         })

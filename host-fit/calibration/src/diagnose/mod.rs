@@ -52,7 +52,7 @@ use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
-use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused, severity};
+use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use faults::{Calibrated, Faults, find_faults};
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
@@ -151,7 +151,7 @@ pub fn diagnose_log(
     } else {
         out.conclude(basis);
     }
-    out.validity = field.and_then(|field| {
+    out.validity = field.and_then(|_| {
         let estimate = fitted.ok().map(|fit| &fit.estimate)?;
         let (mut parameters, mut covariance) =
             (estimate.parameters, estimate.posterior.covariance.clone());
@@ -161,7 +161,7 @@ pub fn diagnose_log(
                 .view_mut((0, 0), repair.covariance.shape())
                 .copy_from(&repair.covariance);
         }
-        Validity::new(stage, &parameters, field.noise.white_mm, &covariance)
+        Validity::new(stage, &parameters, estimate.posterior.white_mm, &covariance)
     });
     out
 }
@@ -250,20 +250,10 @@ impl Diagnosis {
         if is_refused(&self.findings) {
             return;
         }
-        if of.residual > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
-            // Other models lack terms.
-            let cost = of.predicted.map_or(1.0, |of| of.worst_ratio());
-            let severity = match by.model {
-                ModelKind::Field => severity(cost).max(Severity::Warn),
-                _ => Severity::Refuse,
-            };
-            let found = Finding::new(Kind::Inconsistent { ratio: of.residual });
-            of.findings
-                .push(found.with_severity(severity).with_cost(cost));
-        }
         if let Some((repair, expected)) = of.repair {
             let stand = self.findings.iter_mut().filter(|found| stands(found));
-            for found in stand.chain(&mut of.findings) {
+            let taken_off = |found: &&mut Finding| found.code() != Code::ModelLacks;
+            for found in stand.chain(of.findings.iter_mut().filter(taken_off)) {
                 found.is_repaired = true;
                 found.severity = found.severity.min(Severity::Warn);
             }

@@ -24,10 +24,13 @@ pub fn declared_service(
     parameters: &FieldParameters,
     white_mm: [f64; 3],
 ) -> Option<Service> {
-    // The motion of service has an rms of half its range, evenly spread poses 0.58 of theirs.
+    Service::new(parameters, white_mm, service_poses(service_range(stage)))
+}
+
+/// The range of evenly spread poses with the rms that `[motion]` declares for service: half its range.
+pub fn service_range(stage: &Stage) -> ([f64; 3], [f64; 3]) {
     let most = |axis: usize| 0.75f64.sqrt() * stage.motion.axes[axis].service;
-    let poses = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
-    Service::new(parameters, white_mm, poses)
+    ([0, 1, 2].map(most), [3, 4, 5].map(most))
 }
 
 /// Errors of X, Y, Rz that are predicted for service over the range that `[motion]` declares.

@@ -6,7 +6,7 @@ use hallstage_input::finding::{Code, Finding, Kind, Severity, Trust};
 use serde::Serialize;
 
 /// Largest predicted errors in service over the noise floor for a note.
-const NOTE_MAX: f64 = 1.05;
+pub const NOTE_MAX: f64 = 1.05;
 /// Largest predicted errors in service over the noise floor for the verdict good.
 pub const GOOD_MAX: f64 = 1.10;
 /// Largest predicted errors in service over the noise floor for the verdict limited.

@@ -62,7 +62,11 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("{on} changes more than twice. Its course between the changes is unknown, so the calibration is not free of it")
         }
         Kind::Inconsistent { ratio } => {
-            format!("the log is inconsistent: the Hall residuals are {ratio:.1} times the noise, and no single fault explains them")
+            let like = match on {
+                "" => String::new(),
+                on => format!(". They look like an error of {on} that follows the motion"),
+            };
+            format!("no known fault explains the residuals{like}. In service such errors are up to {ratio:.2} times the noise floor")
         }
         Kind::NotDetermined { ratios: [x, y, rz] } => {
             format!("the log does not determine the calibration: in service over the range of [motion] in stage.toml, expect errors of {x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")

@@ -3,7 +3,7 @@
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::error::FieldFitError;
-use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
+use super::noise::{USUAL_DRIFT_MM, drift_mm, floor_mm, white_mm, white_only};
 use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
@@ -215,7 +215,7 @@ impl WhiteFit {
     pub fn finish(mut self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
         let mut covariance = self.covariance(&self.normal()?)?;
         // White noise alone makes the errors too small, never too large: what fails here, fails.
-        let early = self.comparison(stage, &self.posterior(&covariance));
+        let early = self.comparison(stage, &self.posterior(&covariance, self.noise));
         if early.loses() {
             return Err(FieldFitError::NotCarried(Box::new(early)));
         }
@@ -245,7 +245,12 @@ impl WhiteFit {
         };
         let shows_acceleration = self.shows_acceleration && MotionFit::is_shown_by(&covariance);
         let motion = MotionFit::new(self.at.values.as_slice(), &covariance, shows_acceleration);
-        let (posterior, temperature) = self.with_temperature(covariance);
+        let [floor_mm, _] = floor_mm(&self.rows, self.noise.white_mm, stage);
+        let floor = Noise {
+            white_mm: floor_mm,
+            ..self.noise
+        };
+        let (posterior, temperature) = self.with_temperature(covariance, floor);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
         let weight =
@@ -282,7 +287,11 @@ impl WhiteFit {
 
     /// The posterior with k and h, and k and h: the values that the rows were compensated with plus the estimated
     /// changes.
-    fn with_temperature(&self, mut covariance: DMatrix<f64>) -> (Posterior, TemperatureFit) {
+    fn with_temperature(
+        &self,
+        mut covariance: DMatrix<f64>,
+        floor: Noise,
+    ) -> (Posterior, TemperatureFit) {
         let mut temperature = self.temperature;
         for of in Coefficient::ALL {
             if self.sensors.spans_k[of.sensor] > 0.0 {
@@ -295,7 +304,7 @@ impl WhiteFit {
         let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
         let signal_to_noise = mean_square / (white_mm * white_mm);
         self.sensors.complete(&mut covariance, signal_to_noise);
-        let parameters_only = self.posterior(&covariance);
+        let parameters_only = self.posterior(&covariance, floor);
         let posterior = match temperature.is_used() {
             true => parameters_only.with_temperature(&covariance),
             false => parameters_only,
@@ -337,8 +346,8 @@ impl WhiteFit {
             .ok_or(FieldFitError::Singular)
     }
 
-    fn posterior(&self, covariance: &DMatrix<f64>) -> Posterior {
-        Posterior::new(covariance, &self.parameters(), &self.noise)
+    fn posterior(&self, covariance: &DMatrix<f64>, noise: Noise) -> Posterior {
+        Posterior::new(covariance, &self.parameters(), &noise)
     }
 
     fn comparison(&self, stage: &Stage, posterior: &Posterior) -> Comparison {

@@ -25,7 +25,8 @@ pub struct Posterior {
     /// Which parameters these are, by their places among the 81 and k and h.
     pub determined: Vec<usize>,
     parameters: FieldParameters,
-    pub(super) white_mm: [f64; 3],
+    /// Noise of the probes that makes the noise floor, mm.
+    pub white_mm: [f64; 3],
 }
 
 /// What is to be expected of a pose, as covariances of X, Y, Rz in m, m, rad.

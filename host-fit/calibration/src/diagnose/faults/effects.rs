@@ -6,7 +6,7 @@ use hallstage_input::channel::Channel;
 use hallstage_input::finding::Quantity;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::parameters::FieldParameters;
-use hallstage_solver::estimator::probe::probes;
+use hallstage_solver::estimator::probe::{Probe, probes};
 use hallstage_solver::estimator::rows::FieldRow;
 use nalgebra::Vector3;
 use runtime::VerticalPose;
@@ -87,6 +87,11 @@ impl Suspect {
         }
     }
 
+    /// The gaps of a suspect, by their place among all channels.
+    pub(super) fn gaps(&self) -> Range<usize> {
+        self.first.max(6)..(self.first + self.count).max(6)
+    }
+
     pub(super) const fn is_single(&self) -> bool {
         self.count == 1
     }
@@ -110,13 +115,49 @@ impl Suspect {
     }
 }
 
+/// What channels show in some rows, and how their errors change the signals.
+pub(super) struct Sensed {
+    /// What each of the nine channels shows, mm, by row.
+    pub(super) values: Vec<[f64; 9]>,
+    /// Changes of the signals (mm) for a change of each of the nine channels by 1 mm, by row.
+    pub(super) by_channel: Vec<[Vector3<f64>; 9]>,
+}
+
+impl Sensed {
+    pub(super) fn new(rows: &[FieldRow], stage: &Stage, probes: &[Probe; 3], lag_s: f64) -> Self {
+        let slopes = Slopes::new(stage, *probes);
+        let at = |row: &FieldRow| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical);
+        Self {
+            values: Self::values(rows, stage, probes, lag_s),
+            by_channel: rows.iter().map(at).collect(),
+        }
+    }
+
+    /// The fitted signals, because at rest a measured signal is all noise, which explains itself.
+    pub(super) fn values(
+        rows: &[FieldRow],
+        stage: &Stage,
+        probes: &[Probe; 3],
+        lag_s: f64,
+    ) -> Vec<[f64; 9]> {
+        let half_m = 0.5 * stage.y_baseline_m;
+        let values = |row: &FieldRow| {
+            let planar_mm = row.planar_mm(lag_s, [0.0; 3]);
+            let [a, b, c] = probes.map(|probe| probe.signal_mm(planar_mm, row.vertical));
+            let [x, y, rz] = row.reference_mm;
+            let vertical = VerticalPose::from_array(row.vertical);
+            let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
+            let [y1, y2] = [y + half_m * rz, y - half_m * rz];
+            [a, b, c, x, y1, y2, one, two, three]
+        };
+        rows.iter().map(values).collect()
+    }
+}
+
 /// The effects of faults on the signals of a log.
 pub(super) struct Effects<'a> {
     pub(super) means: &'a Means,
-    /// What each of the nine channels shows, mm, by mean.
-    values: Vec<[f64; 9]>,
-    /// Changes of the signals (mm) for a change of each of the nine channels by 1 mm, by mean.
-    by_channel: Vec<[Vector3<f64>; 9]>,
+    pub(super) sensed: Sensed,
 }
 
 impl<'a> Effects<'a> {
@@ -127,25 +168,8 @@ impl<'a> Effects<'a> {
         parameters: &FieldParameters,
         lag_s: f64,
     ) -> Self {
-        let probes = probes(parameters);
-        let planar_mm = |row: &FieldRow| row.planar_mm(lag_s, [0.0; 3]);
-        let half_m = 0.5 * stage.y_baseline_m;
-        let values = |row: &FieldRow| {
-            // The fitted signals: at rest a measured signal is all noise, which explains itself.
-            let [a, b, c] = probes.map(|probe| probe.signal_mm(planar_mm(row), row.vertical));
-            let [x, y, rz] = row.reference_mm;
-            let vertical = VerticalPose::from_array(row.vertical);
-            let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
-            let [y1, y2] = [y + half_m * rz, y - half_m * rz];
-            [a, b, c, x, y1, y2, one, two, three]
-        };
-        let slopes = Slopes::new(stage, probes);
-        let at = |row: &FieldRow| slopes.at(planar_mm(row), row.vertical);
-        Self {
-            means,
-            values: means.rows.rows.iter().map(values).collect(),
-            by_channel: means.rows.rows.iter().map(at).collect(),
-        }
+        let sensed = Sensed::new(&means.rows.rows, stage, &probes(parameters), lag_s);
+        Self { means, sensed }
     }
 
     /// The signals of a fault that is the same in the whole log, mm: of a gain of 1 %, of a zero of 1 um, of a time of
@@ -157,15 +181,17 @@ impl<'a> Effects<'a> {
             let after = (at + 1).min(movement.end - 1);
             let size = |channel: usize| match suspect.quantity {
                 Quantity::Zero => 1e-3,
-                Quantity::Gain => 1e-2 * self.values[at][channel],
+                Quantity::Gain => 1e-2 * self.sensed.values[at][channel],
                 Quantity::Time if before == after => 0.0,
                 Quantity::Time => {
-                    let [from, to] = [before, after].map(|at| self.values[at][channel]);
+                    let [from, to] = [before, after].map(|at| self.sensed.values[at][channel]);
                     -1e-3 * (to - from) / (time_s(after) - time_s(before))
                 }
             };
             let channels = suspect.first..suspect.first + suspect.count;
-            let sum: Vector3<f64> = channels.map(|k| self.by_channel[at][k] * size(k)).sum();
+            let sum: Vector3<f64> = channels
+                .map(|k| self.sensed.by_channel[at][k] * size(k))
+                .sum();
             sum.into()
         };
         let movements = self.means.rows.movements.iter();

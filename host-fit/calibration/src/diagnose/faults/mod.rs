@@ -6,17 +6,23 @@
 //! | `estimate` | the most likely parameters, with faults as further unknowns |
 //! | `effects` | the effect on the Hall signals of every fault that is looked for |
 //! | `score` | the fault that explains the residuals best, with the parameters profiled out |
+//! | `motion` | errors of channels that follow the motion, in a log and in service |
+//! | `evidence` | what the residuals still show after all faults |
+//! | `unexplained` | the cost of that in service |
 //! | `findings` | the faults as findings |
 
 mod effects;
 mod estimate;
+mod evidence;
 mod findings;
 mod means;
+mod motion;
 mod score;
 #[cfg(test)]
 mod service_tests;
 #[cfg(test)]
 mod tests;
+mod unexplained;
 
 use super::limits::{ROUNDS, UNDECIDED};
 use crate::fit::{Repair, with_beams_later};
@@ -40,6 +46,7 @@ use nalgebra::DMatrix;
 use runtime::ModelKind;
 use score::{Fault, Scan, Split, split};
 use std::borrow::Cow;
+use unexplained::Unexplained;
 
 /// Maximum number of faults of one log.
 const FAULTS_MAX: usize = 6;
@@ -209,7 +216,7 @@ impl Finder<'_> {
 
     fn faults(&self, faultless: &Estimate) -> Option<Faults> {
         let by = self.calibrated;
-        let declared = declared_service(self.stage, by.parameters, self.means.white_mm)?;
+        let declared = declared_service(self.stage, by.parameters, self.means.floor_mm[0])?;
         let own = self.own_curvature(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;
@@ -243,7 +250,7 @@ impl Finder<'_> {
                 ..Faults::default()
             }
         } else if decides {
-            let predicted = self.expected(faultless, &declared, 1.0)?;
+            let (predicted, _) = self.expected(faultless, &declared, 1.0)?;
             alone(not_determined(&predicted), predicted)
         } else if let Some(Split { from, off, .. }) = other {
             let whole = faultless.curvature.inverse();
@@ -269,7 +276,7 @@ impl Finder<'_> {
     ) -> Option<Faults> {
         // Residuals that no fault explains make the parameters less certain.
         let inflation = residual.max(1.0).powi(2);
-        let predicted = self.expected(estimate, declared, inflation)?;
+        let (predicted, off) = self.expected(estimate, declared, inflation)?;
         let (own_cost, bent) = (predicted.worst_ratio(), self.own_curvature(estimate)?);
         let is_felt = |cost: f64| severity(cost) > Severity::Note;
         let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), self.calibrated.is_fitted);
@@ -313,6 +320,18 @@ impl Finder<'_> {
         }
         let covariance = estimate.curvature.inverse() * inflation;
         let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
+        // Other models lack terms, and are not for service.
+        let unexplained = match self.calibrated.model {
+            ModelKind::Field => Some(Unexplained::new(self, (faults, estimate), declared, &off)?),
+            _ => None,
+        };
+        let [predicted, expected] = match &unexplained {
+            Some(more) => [
+                predicted.with_added(more.added),
+                expected.with_added(more.after_repair),
+            ],
+            None => [predicted, expected],
+        };
         let is_better = is_worth_it
             && is_clear
             && expected.worst_ratio() <= GOOD_MAX
@@ -328,6 +347,8 @@ impl Finder<'_> {
             )
             .with_other_lags(probe_lags_s),
         };
+        let judged = if is_better { &expected } else { &predicted };
+        findings.extend(unexplained.and_then(|more| more.finding(judged)));
         Some(Faults {
             findings,
             predicted: Some(predicted),
@@ -351,19 +372,20 @@ impl Finder<'_> {
     }
 
     /// The errors of the calibration in service: its distance from the estimate, and the covariance of the estimate
-    /// times `inflation`.
+    /// times `inflation`. And that distance.
     fn expected(
         &self,
         estimate: &Estimate,
         declared: &Service,
         inflation: f64,
-    ) -> Option<Predicted> {
+    ) -> Option<(Predicted, Vec<f64>)> {
         let (values, covariance) = match self.calibrated.model {
             ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
             _ => estimate.with_usual_terms()?,
         };
         let own = self.calibrated.parameters.probes.as_flattened();
         let off: Vec<f64> = own.iter().zip(&values).map(|(a, b)| a - b).collect();
-        Some(Predicted::new(declared, &(covariance * inflation), &off))
+        let predicted = Predicted::new(declared, &(covariance * inflation), &off);
+        Some((predicted, off))
     }
 }

@@ -6,7 +6,7 @@ use crate::diagnose::limits::UNDECIDED;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::Quantity;
 use hallstage_solver::estimator::gauss_newton::{Factor, Normal};
-use hallstage_solver::estimator::whiten::UNKNOWNS;
+use hallstage_solver::estimator::whiten::{Gain, UNKNOWNS};
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -27,25 +27,30 @@ const SEEN_MIN: f64 = 0.01;
 
 type Columns = SMatrix<f64, WIDTH, 3>;
 
+/// A step of the filter: innovation per error of the reference, error per innovation, and what makes an innovation white.
+pub(super) type Step = [Matrix3<f64>; 3];
+
+pub(super) fn steps(estimate: &Estimate) -> Option<Vec<Step>> {
+    let step = |gain: &Gain| {
+        let of = [gain.by_pose, gain.kalman, gain.factor];
+        let [by_error, kalman, factor] = of.map(|rows| Matrix3::from(rows).transpose());
+        Some([by_error, kalman, factor.try_inverse()?])
+    };
+    estimate.gains.iter().map(step).collect()
+}
+
 /// An estimate, prepared to be scanned for faults.
 pub(super) struct Scan<'a> {
     effects: &'a Effects<'a>,
     estimate: &'a Estimate,
     /// The rows of the estimate, whitened backwards too.
     rows: Vec<Columns>,
-    /// The steps of the filter: innovation per error of the reference, error per innovation, and what makes an
-    /// innovation white.
-    steps: Vec<[Matrix3<f64>; 3]>,
+    steps: Vec<Step>,
 }
 
 impl<'a> Scan<'a> {
     pub(super) fn new(effects: &'a Effects, estimate: &'a Estimate) -> Option<Self> {
-        let mut steps = Vec::with_capacity(estimate.gains.len());
-        for gain in &estimate.gains {
-            let of = [gain.by_pose, gain.kalman, gain.factor];
-            let [by_error, kalman, factor] = of.map(|rows| Matrix3::from(rows).transpose());
-            steps.push([by_error, kalman, factor.try_inverse()?]);
-        }
+        let steps = steps(estimate)?;
         let mut rows: Vec<Columns> = estimate.rows.iter().map(|row| (*row).into()).collect();
         for movement in &effects.means.rows.movements {
             let mut error = Columns::zeros();
