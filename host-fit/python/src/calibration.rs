@@ -12,7 +12,7 @@ use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
-use host_fit::calibrate::{Outcome, Updated, other_scales};
+use host_fit::calibrate::{JudgedFit, Updated, other_scales};
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::StoredPosterior;
@@ -48,7 +48,7 @@ pub struct Calibration {
 impl Calibration {
     /// The calibration of a fit that has a blob, with its report.
     pub fn from_fit(
-        outcome: Outcome,
+        outcome: JudgedFit,
         report: Report,
         log: Arc<LogReading>,
         designed: Arc<Designed>,

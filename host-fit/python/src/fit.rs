@@ -5,7 +5,7 @@ use crate::error::{calibrate_error, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work::{self, WATCH};
-use host_fit::calibrate::{FitOrder, Limits};
+use host_fit::calibrate::{ErrorLimits, FitOrder};
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::fit::{FitSettings, ModelChoice};
 use host_fit::cli::FitOptions;
@@ -33,7 +33,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     settings.options.watch = WATCH;
     let order = FitOrder {
         settings,
-        limits: Limits::default(),
+        limits: ErrorLimits::default(),
         is_kept: false,
     };
     let (reading, stage) = (&log.reading, &log.designed);

@@ -1,6 +1,6 @@
 //! The origin of a calibration: a fit, an update or files.
 
-use host_fit::calibrate::{Outcome, Updated};
+use host_fit::calibrate::{JudgedFit, Updated};
 use host_fit::calibration::diagnose::Diagnosis;
 use host_fit::calibration::fit::Fit;
 use host_fit::input::log::LogReading;
@@ -16,7 +16,7 @@ pub enum Origin {
 }
 
 pub struct OfFit {
-    pub outcome: Outcome,
+    pub outcome: JudgedFit,
     pub report: Report,
     pub log: Arc<LogReading>,
 }

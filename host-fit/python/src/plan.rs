@@ -14,7 +14,7 @@ use host_fit::input::text::TextReader;
 use host_fit::output::write_atomically;
 use host_fit::report::plan::{figures, tables};
 use host_fit::report::text::as_text;
-use host_fit::simulate::dynamics::Dynamics;
+use host_fit::simulate::dynamics::MotionEffects;
 use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::plan_file;
 use host_fit::simulate::pose::StagePose;
@@ -125,7 +125,7 @@ pub fn simulate<'py>(
         return Err(wrong("hour", "-24 to 24 h of the day are possible"));
     }
     let recorded = work::run(py, || {
-        let recording = record_stage(&designed, run, hour, Dynamics::NONE, seed)?;
+        let recording = record_stage(&designed, run, hour, MotionEffects::NONE, seed)?;
         let csv = log_csv(&recording, &designed);
         let name = Path::new("simulated");
         let reading = log::read_bytes(csv.as_bytes(), name, &designed, &ReadOptions::FIT);

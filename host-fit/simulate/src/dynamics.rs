@@ -30,7 +30,7 @@ const DAMPING: f64 = 0.02;
 
 /// The effects of motion on the probes A, B, C of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dynamics {
+pub struct MotionEffects {
     /// Lag of each probe, s; positive for a late probe.
     pub lag_s: [f64; 3],
     /// Field of the coil at each probe over the acceleration there, designed remanences per m/s2.
@@ -61,7 +61,7 @@ impl Moving {
     }
 }
 
-impl Dynamics {
+impl MotionEffects {
     /// No effects.
     pub const NONE: Self = Self {
         lag_s: [0.0; 3],
@@ -114,7 +114,7 @@ pub struct Motion {
 
 impl Motion {
     /// Probe 0, 1 or 2 at the begin of a movement with rows every `period_s`.
-    pub fn new(dynamics: &Dynamics, probe: usize, period_s: f64) -> Self {
+    pub fn new(dynamics: &MotionEffects, probe: usize, period_s: f64) -> Self {
         Self {
             lag_rows: dynamics.lag_s[probe] / period_s,
             period_s,
@@ -225,7 +225,7 @@ mod tests {
     const PERIOD_S: f64 = 0.002;
 
     /// Signals of the stage of seed 3 without noise, in codes, with these effects.
-    fn recorded(trajectory: Trajectory, dynamics: Dynamics) -> Recording {
+    fn recorded(trajectory: Trajectory, dynamics: MotionEffects) -> Recording {
         let errors = SensorErrors {
             dynamics,
             ..SensorErrors::NONE
@@ -246,9 +246,9 @@ mod tests {
     #[test]
     fn a_late_probe_reads_now_what_it_would_have_read_before() {
         let trajectory = Protocol::Service.run(PERIOD_S, 3).movements.swap_remove(0);
-        let dynamics = Dynamics::draw([PERIOD_S, -PERIOD_S, 0.4 * PERIOD_S], None, None, 3);
-        let [late, sound] =
-            [dynamics, Dynamics::NONE].map(|d| recorded(trajectory.clone(), d).movements.concat());
+        let dynamics = MotionEffects::draw([PERIOD_S, -PERIOD_S, 0.4 * PERIOD_S], None, None, 3);
+        let [late, sound] = [dynamics, MotionEffects::NONE]
+            .map(|d| recorded(trajectory.clone(), d).movements.concat());
         for k in 2..late.len() - 2 {
             let [before, now, after] = [k - 1, k, k + 1].map(|k| sound[k].hall);
             assert_eq!(late[k].hall[..2], [before[0], after[1]]);
@@ -318,11 +318,11 @@ mod tests {
         let (amplitude, hz) = (300e-6, 8.0);
         let (rate_squared, m_per_count) = ((TAU * hz) * (TAU * hz), stage().hall.m_per_count);
         let [near, far] = [0.05, 0.1].map(|coil_m| {
-            let dynamics = Dynamics::draw([0.0; 3], Some(coil_m), None, 3);
+            let dynamics = MotionEffects::draw([0.0; 3], Some(coil_m), None, 3);
             let mut largest = [0.0f64; 3];
             for axis in [0, 1, 3] {
                 let trajectory = sine(axis, amplitude, hz);
-                let [moved, sound] = [dynamics, Dynamics::NONE]
+                let [moved, sound] = [dynamics, MotionEffects::NONE]
                     .map(|d| recorded(trajectory.clone(), d).movements.concat());
                 for (probe, largest) in largest.iter_mut().enumerate() {
                     let (mut product, mut square) = (0.0, 0.0);

@@ -1,7 +1,7 @@
 //! The recording of a run of a simulated stage: codes, beams and the truth.
 
 use super::assembly::Assembly;
-use super::dynamics::{Dynamics, Motion, Moving};
+use super::dynamics::{Motion, MotionEffects, Moving};
 use super::pose::StagePose;
 use super::protocol::Run;
 use super::random::{Purpose, Stream};
@@ -79,7 +79,7 @@ pub fn record_stage(
     stage: &Stage,
     run: Run,
     hour: Option<f64>,
-    dynamics: Dynamics,
+    dynamics: MotionEffects,
     seed: u64,
 ) -> Result<Recording, RecordError> {
     let assembly = Assembly::draw(stage, seed);
@@ -146,7 +146,7 @@ fn record_with(
         let mut reference = ReferenceError::reset(errors, run.is_zero_exact, period_s, &mut random);
         let mut samples = Vec::with_capacity(poses.len());
         let mut warmed = *assembly;
-        let dynamics = (errors.dynamics != Dynamics::NONE).then_some(&errors.dynamics);
+        let dynamics = (errors.dynamics != MotionEffects::NONE).then_some(&errors.dynamics);
         let mut motions = dynamics.map(|d| [0, 1, 2].map(|probe| Motion::new(d, probe, period_s)));
         let mut temperature_mc = [MISSING_CODE; 2];
         for (k, pose) in poses.iter().enumerate() {

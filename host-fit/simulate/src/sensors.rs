@@ -9,7 +9,7 @@
 //! | drift of Rz | random walk, 85 nrad after 1 s | same |
 //! | error of a reset in X and Y / in Rz | 2.1 um / 1.6 urad rms | first rows of the 171 movements of three paper logs |
 
-use super::dynamics::Dynamics;
+use super::dynamics::MotionEffects;
 use super::pose::StagePose;
 use super::random::Stream;
 use hallstage_input::stage::{CodeScale, Stage};
@@ -28,7 +28,7 @@ pub struct SensorErrors {
     /// Error of a reset in X, Y (m) and Rz (rad).
     pub reset: [f64; 3],
     /// Lag, coils and arms of the probes.
-    pub dynamics: Dynamics,
+    pub dynamics: MotionEffects,
 }
 
 impl SensorErrors {
@@ -39,7 +39,7 @@ impl SensorErrors {
         beam_m: 5e-9,
         drift_per_root_s: [110e-9, 110e-9, 85e-9],
         reset: [2.1e-6, 2.1e-6, 1.6e-6],
-        dynamics: Dynamics::NONE,
+        dynamics: MotionEffects::NONE,
     };
     /// No errors but the steps of the converters, as for a fit to an endless log.
     pub const NONE: Self = Self {
@@ -48,7 +48,7 @@ impl SensorErrors {
         beam_m: 0.0,
         drift_per_root_s: [0.0; 3],
         reset: [0.0; 3],
-        dynamics: Dynamics::NONE,
+        dynamics: MotionEffects::NONE,
     };
 }
 

@@ -1,6 +1,6 @@
 //! A fit with the decisions around it.
 
-use super::{Limits, name_of};
+use super::{ErrorLimits, name_of};
 use crate::report::figure::{Group, group};
 use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
@@ -22,7 +22,7 @@ pub struct FitOrder {
     /// How it is made. With `force` the blob of a refused log is written, too.
     pub settings: FitSettings,
     /// Largest rms errors of X, Y, Rz: of the field model in service, of others over all rows.
-    pub limits: Limits,
+    pub limits: ErrorLimits,
     /// Whether the calibration is kept. `check` keeps nothing: faults of the log stay in the fit.
     pub is_kept: bool,
 }
@@ -40,7 +40,7 @@ pub enum CalibrateError {
 
 /// What a fit made of a log.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct JudgedFit {
     /// The fit, without the faults of the log where these can be taken off.
     pub fitted: Result<Fit, FitError>,
     /// The faults of the log, and the verdict.
@@ -52,7 +52,7 @@ pub struct Outcome {
     /// Whether the search was ended before its time.
     pub is_interrupted: bool,
     is_kept: bool,
-    limits: Limits,
+    limits: ErrorLimits,
 }
 
 impl FitOrder {
@@ -64,7 +64,7 @@ impl FitOrder {
     ///
     /// # Errors
     /// See [`CalibrateError`].
-    pub fn run(&self, log: &LogReading, stage: &Stage) -> Result<Outcome, CalibrateError> {
+    pub fn run(&self, log: &LogReading, stage: &Stage) -> Result<JudgedFit, CalibrateError> {
         self.judge(self.fit(log, stage)?, log, stage)
     }
 
@@ -92,7 +92,7 @@ impl FitOrder {
         mut fitted: Result<Fit, FitError>,
         log: &LogReading,
         stage: &Stage,
-    ) -> Result<Outcome, CalibrateError> {
+    ) -> Result<JudgedFit, CalibrateError> {
         let is_interrupted = self.is_interrupted();
         let diagnosis = diagnose_log(&log.dataset, stage, fitted.as_ref());
         if let (Some(repair), Some(predicted), true) =
@@ -106,7 +106,7 @@ impl FitOrder {
         if let Some(motion) = &diagnosis.motion {
             fitted = fitted.map(|fit| fit.with_motion(&motion.fit));
         }
-        let mut outcome = Outcome {
+        let mut outcome = JudgedFit {
             fitted,
             diagnosis,
             refusal: None,
@@ -140,7 +140,7 @@ impl FitOrder {
     }
 }
 
-impl Outcome {
+impl JudgedFit {
     /// Whether the field model was fitted. It is made for service, the other models for the movements of the log.
     fn is_field(&self) -> bool {
         self.fitted.as_ref().is_ok_and(|fit| fit.field.is_some())

@@ -10,9 +10,9 @@ const KINDS: [Kind; 3] = [Kind::Length, Kind::Length, Kind::Angle];
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limits(pub [Option<f64>; 3]);
+pub struct ErrorLimits(pub [Option<f64>; 3]);
 
-impl FromStr for Limits {
+impl FromStr for ErrorLimits {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -39,7 +39,7 @@ impl FromStr for Limits {
     }
 }
 
-impl Limits {
+impl ErrorLimits {
     /// The rms errors (m, m, rad) that are beyond their limits.
     pub fn exceeded(&self, rms: [f64; 3]) -> Vec<Beyond> {
         let beyond = |axis: usize| {
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn limits_are_read_with_their_units() {
-        let read = |text: &str| text.parse::<Limits>().map(|limits| limits.0);
+        let read = |text: &str| text.parse::<ErrorLimits>().map(|limits| limits.0);
         assert_eq!(
             read("x=1.5um, rz = 4 urad"),
             Ok([Some(1.5 * 1e-6), None, Some(4.0 * 1e-6)])

@@ -10,8 +10,8 @@ mod recalibration;
 pub(crate) use choice::values;
 pub use choice::{Choice, name_of};
 pub use evaluation::{EvalOrder, Evaluation};
-pub use fitted::{CalibrateError, FitOrder, Outcome};
-pub use limit::Limits;
+pub use fitted::{CalibrateError, FitOrder, JudgedFit};
+pub use limit::ErrorLimits;
 pub use recalibration::Updated;
 
 use hallstage_input::stage::Stage;

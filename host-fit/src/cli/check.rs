@@ -3,8 +3,8 @@
 use super::arguments::{Json, Logs};
 use super::fit::Job;
 use super::interrupt;
-use super::report::Report;
-use crate::calibrate::{FitOrder, Limits};
+use super::report::ReportArgs;
+use crate::calibrate::{ErrorLimits, FitOrder};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;
@@ -19,7 +19,7 @@ pub(super) struct CheckArgs {
     #[command(flatten)]
     logs: Logs,
     #[command(flatten)]
-    report: Report,
+    report: ReportArgs,
     #[command(flatten)]
     json: Json,
 }
@@ -38,7 +38,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         title: "Check of a log",
         order: FitOrder {
             settings,
-            limits: Limits::default(),
+            limits: ErrorLimits::default(),
             is_kept: false,
         },
         out: None,

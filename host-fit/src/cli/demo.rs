@@ -20,7 +20,7 @@ use hallstage_input::log::{self, ReadOptions};
 use hallstage_input::shipped::{FILES, STAGE_TOML};
 use hallstage_input::stage::Stage;
 use hallstage_simulate::assembly::Assembly;
-use hallstage_simulate::dynamics::Dynamics;
+use hallstage_simulate::dynamics::MotionEffects;
 use hallstage_simulate::protocol::{Protocol, REST_S, Run};
 use hallstage_simulate::recording::{Recording, record_in, record_stage};
 use hallstage_simulate::sensors::SensorErrors;
@@ -273,7 +273,7 @@ fn day(stage: &Stage) -> Result<String, HostError> {
 /// A line about fast moves of a simulated stage with late probes and arms that bend.
 fn fast_moves(stage: &Stage) -> Result<String, HostError> {
     const SEED: u64 = 7;
-    let dynamics = Dynamics::draw([3e-4, -3e-4, 0.0], None, Some(120.0), SEED);
+    let dynamics = MotionEffects::draw([3e-4, -3e-4, 0.0], None, Some(120.0), SEED);
     let record = |run| record_stage(stage, run, None, dynamics, SEED);
     let planned = plan(stage, RUN_S)?.run.trajectory(stage.servo_period_s);
     let fit = field_fit(&[&record(Run::planned(planned))?], stage)?;

@@ -1,7 +1,7 @@
 //! `host-fit eval`.
 
 use super::arguments::{Json, Logs, choice};
-use super::report::{Report, finish};
+use super::report::{ReportArgs, finish};
 use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -28,7 +28,7 @@ pub(super) struct EvalArgs {
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     limit: Option<f64>,
     #[command(flatten)]
-    report: Report,
+    report: ReportArgs,
     #[command(flatten)]
     json: Json,
 }

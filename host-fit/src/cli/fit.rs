@@ -28,7 +28,7 @@ pub(super) struct FitArgs {
     #[command(flatten)]
     pub(super) threads: Threads,
     #[command(flatten)]
-    report: super::report::Report,
+    report: super::report::ReportArgs,
     #[command(flatten)]
     json: Json,
 }
@@ -62,7 +62,7 @@ impl Job<'_> {
     /// Reads, fits, judges; then writes JSON, report and blob, in this order.
     pub(super) fn run(
         &self,
-        (logs, page, json): (&Logs, &super::report::Report, &Json),
+        (logs, page, json): (&Logs, &super::report::ReportArgs, &Json),
     ) -> Result<(), HostError> {
         let started = Instant::now();
         let stage = logs.stage.read()?;

@@ -2,7 +2,7 @@
 //! be fitted.
 
 use super::arguments::{blob_text, choice, train};
-use crate::calibrate::{FitOrder, Limits};
+use crate::calibrate::{ErrorLimits, FitOrder};
 use clap::{Args, Command, FromArgMatches};
 use hallstage_calibration::fit::{FitSettings, ModelChoice};
 use hallstage_input::watch::Watch;
@@ -59,7 +59,7 @@ pub struct FitOptions {
     /// Largest rms errors, of the field model in service, of others over all rows; beyond, no blob is
     /// written.
     #[arg(long, value_name = "x=1.5um,...")]
-    pub limit: Option<Limits>,
+    pub limit: Option<ErrorLimits>,
     /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
     #[arg(long)]
     pub force: bool,

@@ -200,7 +200,7 @@ fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
 /// goes to standard output, nothing else does from now on.
 fn check_outputs<'p>(
     outputs: impl IntoIterator<Item = Option<&'p Path>>,
-    report: Option<&report::Report>,
+    report: Option<&report::ReportArgs>,
     inputs: impl IntoIterator<Item = &'p Path>,
 ) -> Result<(), HostError> {
     let inputs: Vec<&Path> = inputs.into_iter().collect();
@@ -216,7 +216,7 @@ fn check_outputs<'p>(
     let folder = report.and_then(|report| report.folder.as_deref());
     let new = folder.filter(|folder| !folder.exists());
     let page = report
-        .and_then(report::Report::page)
+        .and_then(report::ReportArgs::page)
         .filter(|_| new.is_none());
     outputs.extend(page.as_deref());
     let beside: Vec<_> = (inputs.iter())

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 /// Where the report of a command goes.
 #[derive(Debug, Default, Args)]
-pub(super) struct Report {
+pub(super) struct ReportArgs {
     /// Write a report into this folder: one page, DIR/index.html.
     #[arg(id = "report", long = "report", value_name = "DIR")]
     pub(super) folder: Option<PathBuf>,
@@ -42,7 +42,7 @@ fn note(text: &str) -> Result<(String, String), &'static str> {
     }
 }
 
-impl Report {
+impl ReportArgs {
     /// The one file of the report.
     pub(super) fn page(&self) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join("index.html"))

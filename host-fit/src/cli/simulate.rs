@@ -8,7 +8,7 @@ use clap::Args;
 use flate2::{Compression, write::GzEncoder};
 use hallstage_input::axis::counted;
 use hallstage_simulate::assembly::Magnets;
-use hallstage_simulate::dynamics::Dynamics;
+use hallstage_simulate::dynamics::MotionEffects;
 use hallstage_simulate::log_text::{log_csv, truth_csv};
 use hallstage_simulate::plan_file;
 use hallstage_simulate::protocol::{Protocol, Run};
@@ -97,7 +97,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         }
     };
     let coil_m = args.coil_cm.map(|cm| cm * 1e-2);
-    let dynamics = Dynamics::draw(lag_us.map(|us| us * 1e-6), coil_m, args.arm_hz, args.seed);
+    let dynamics = MotionEffects::draw(lag_us.map(|us| us * 1e-6), coil_m, args.arm_hz, args.seed);
     let recording = record_stage(&stage, run, args.hour, dynamics, args.seed)?;
     let mut outputs = Outputs::default();
     if let Some(path) = truth {

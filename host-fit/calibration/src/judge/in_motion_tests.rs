@@ -9,7 +9,7 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding};
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
-use hallstage_simulate::dynamics::Dynamics;
+use hallstage_simulate::dynamics::MotionEffects;
 use hallstage_simulate::protocol::{Protocol, Run};
 use hallstage_simulate::recording::record_stage;
 use hallstage_solver::estimator::rows::planar_motion;
@@ -31,7 +31,7 @@ fn two_tones(stage: &Stage) -> Run {
 
 /// A stage with these effects, with the motion of its fast moves declared for service: fit, diagnosis and the log of
 /// these moves.
-fn calibrated(dynamics: Dynamics) -> (Stage, Fit, Diagnosis, Dataset) {
+fn calibrated(dynamics: MotionEffects) -> (Stage, Fit, Diagnosis, Dataset) {
     let mut stage = stage();
     let period_s = stage.servo_period_s;
     let log = |run| {
@@ -66,7 +66,7 @@ fn errors(stage: &Stage, fit: &Fit, fast: &Dataset) -> [[f64; 3]; 2] {
 
 #[test]
 fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
-    let (stage, sound, diagnosis, fast) = calibrated(Dynamics::NONE);
+    let (stage, sound, diagnosis, fast) = calibrated(MotionEffects::NONE);
     let [corrected, floor] = errors(&stage, &sound, &fast);
     assert_eq!(diagnosis.verdict, Some(Verdict::Good));
     for axis in 0..3 {
@@ -74,7 +74,7 @@ fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
         assert!((0.99..1.005).contains(&cost), "{axis}: {cost}");
     }
     for lags_s in [[3e-4, -3e-4, 0.0], [0.0; 3]] {
-        let dynamics = Dynamics::draw(lags_s, None, Some(120.0), SEED);
+        let dynamics = MotionEffects::draw(lags_s, None, Some(120.0), SEED);
         let (stage, bent, diagnosis, fast) = calibrated(dynamics);
         for (found_s, lag_s) in bent.estimate.motion.dynamics.probe_lag_s.iter().zip(lags_s) {
             assert!((found_s - lag_s).abs() < 10e-6, "{found_s} {lag_s}");
@@ -110,7 +110,8 @@ fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
 #[test]
 fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
     let calibrated = [[0.0; 3], [1.8e-4; 3]].map(|lags_s| {
-        let (stage, fit, diagnosis, fast) = calibrated(Dynamics::draw(lags_s, None, None, SEED));
+        let (stage, fit, diagnosis, fast) =
+            calibrated(MotionEffects::draw(lags_s, None, None, SEED));
         (errors(&stage, &fit, &fast)[1], diagnosis)
     });
     let [(floor, sound), (late, diagnosis)] = calibrated;
@@ -129,7 +130,7 @@ fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
 
 #[test]
 fn one_late_probe_is_told_once() {
-    let (_, _, diagnosis, _) = calibrated(Dynamics::draw([1e-3, 0.0, 0.0], None, None, SEED));
+    let (_, _, diagnosis, _) = calibrated(MotionEffects::draw([1e-3, 0.0, 0.0], None, None, SEED));
     let codes: Vec<Code> = diagnosis.findings.iter().map(Finding::code).collect();
     assert_eq!(codes, [Code::Motion], "{:?}", diagnosis.findings);
     assert_eq!(diagnosis.verdict, Some(Verdict::Limited));

@@ -1,6 +1,6 @@
 //! The fit of a model of the paper by the errors of the pose: a start from a regression, then Gauss-Newton.
 
-use super::linear::{Point, parameters_of};
+use super::linear::{LinearPoint, parameters_at};
 use super::pose::{COLUMNS, Decoder};
 use crate::estimator::gauss_newton::{self, Limits, Solved, Unknowns};
 use crate::estimator::model::{COUNT, Model, ParameterId};
@@ -185,11 +185,11 @@ fn regression(problem: &Problem) -> Option<Parameters> {
     }
     let inverse = products.try_inverse();
     let found = inverse.and_then(|inverse| {
-        let point = Point {
+        let point = LinearPoint {
             gain: squares * inverse,
             ratios: [[0.0; 3]; 3],
         };
-        parameters_of(&point, problem.stage)
+        parameters_at(&point, problem.stage)
     });
     // Where noise hides the motion, the design is as good a start.
     let mut start = found.unwrap_or_else(|| Parameters::designed(problem.stage));

@@ -9,7 +9,7 @@ use runtime::matrix::{inverse, to_rows};
 
 /// The point (G, r) of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct LinearPoint {
     /// Gain: pose (mm, mm, mrad) per mm of corrected signal, G = PM^-1 diag(1/eta).
     pub gain: Matrix3<f64>,
     /// Slopes over eta of each probe: (a, b, c) / eta in 1/m, 1/rad, 1/rad for Model (31).
@@ -17,14 +17,14 @@ pub struct Point {
 }
 
 /// The point (G, r) of a set of parameters, or `None` where PM is singular or an eta is zero.
-pub fn point_of(p: &Parameters) -> Option<Point> {
+pub fn linear_point(p: &Parameters) -> Option<LinearPoint> {
     let inverse = inverse(&p.geometry().plane())?;
     let eta = p.eta();
     if eta.iter().any(|eta| !eta.is_normal()) {
         return None;
     }
     let slopes = p.slopes();
-    Some(Point {
+    Some(LinearPoint {
         gain: Matrix3::from_fn(|i, j| inverse[(i, j)] / eta[j]),
         ratios: [0, 1, 2].map(|probe| slopes[probe].map(|slope| slope / eta[probe])),
     })
@@ -33,7 +33,7 @@ pub fn point_of(p: &Parameters) -> Option<Point> {
 /// The parameters of a point: the rows of G^-1 = diag(eta) PM give eta, misalignment and lever
 /// arm of each probe. `None` where G is singular. Each theta comes out within a quarter turn of the
 /// designed one.
-pub fn parameters_of(point: &Point, stage: &Stage) -> Option<Parameters> {
+pub fn parameters_at(point: &LinearPoint, stage: &Stage) -> Option<Parameters> {
     let m = to_rows(&inverse(&point.gain)?);
     let mut geometry = stage.geometry();
     let mut eta = [1.0; 3];

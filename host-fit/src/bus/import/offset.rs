@@ -17,7 +17,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::clocks::{Alignment, Lag};
 use nalgebra::Matrix3;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use rows::Row;
+use rows::ReferencedTick;
 
 /// The estimated offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -242,7 +242,7 @@ impl<'r> Records<'r> {
     fn step(
         &self,
         alignment: &mut Alignment,
-        rows: &[Row],
+        rows: &[ReferencedTick],
         clocks: &mut Clocks,
     ) -> Result<Lag, ImportError> {
         let lag = alignment
@@ -261,11 +261,11 @@ impl<'r> Records<'r> {
     fn check_pieces(
         &self,
         alignment: &Alignment,
-        rows: &[Row],
+        rows: &[ReferencedTick],
         clocks: &Clocks,
         excess: f64,
     ) -> Result<(), ImportError> {
-        let key = |row: &Row| (row.movement, (row.tick.t_us / PIECE_US).floor() as i64);
+        let key = |row: &ReferencedTick| (row.movement, (row.tick.t_us / PIECE_US).floor() as i64);
         let least_motion = MOTION_MIN * self.explained(rows)[1] / rows.len() as f64;
         for piece in rows.chunk_by(|a, b| key(a) == key(b)) {
             let [explained, motion] = self.explained(piece);

@@ -29,7 +29,7 @@ pub(crate) mod sample_for_tests;
 mod tests;
 
 use crate::estimator::least_squares::zero_deviations;
-use crate::estimator::linear::{Point, parameters_of, point_of};
+use crate::estimator::linear::{LinearPoint, linear_point, parameters_at};
 use crate::estimator::paper::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, search_box};
 use crate::estimator::problem::Problem;
 use crate::solve::Projection;
@@ -120,7 +120,7 @@ impl<'a> Objective<'a> {
             Projection::Linear => {
                 let ratios = self.ratios(individual);
                 let (gain, _) = rows::best_gain(self.problem, &ratios)?;
-                return parameters_of(&Point { gain, ratios }, self.problem.stage);
+                return parameters_at(&LinearPoint { gain, ratios }, self.problem.stage);
             }
         };
         parameters.values[..THETA].copy_from_slice(&arms_m);
@@ -191,7 +191,7 @@ impl<'a> Objective<'a> {
             return Some(rows::best_gain(problem, &self.ratios(individual))?.1);
         }
         let parameters = self.parameters(individual)?;
-        let point = point_of(&parameters)?;
+        let point = linear_point(&parameters)?;
         if self.projection == Projection::None {
             let delta_m = |movement| self.delta_m_of(individual, movement);
             return Some(rows::squares_at_delta(problem, &point, delta_m));

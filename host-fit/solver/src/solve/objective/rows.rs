@@ -5,7 +5,7 @@
 //! G (s' - delta) with G = PM^-1 diag(1/eta) and s' = s / (phi / eta).
 
 use super::poles::SHARE_MIN;
-use crate::estimator::linear::Point;
+use crate::estimator::linear::LinearPoint;
 use crate::estimator::paper::Parameters;
 use crate::estimator::problem::Problem;
 use crate::estimator::rows::FieldRow;
@@ -35,7 +35,7 @@ impl Ratios {
 /// At the given zero deviation of each movement, m.
 pub fn squares_at_delta(
     problem: &Problem<'_>,
-    point: &Point,
+    point: &LinearPoint,
     delta_m: impl Fn(usize) -> [f64; 3],
 ) -> Vector3<f64> {
     let ratios = Ratios::new(&point.ratios);
@@ -55,7 +55,7 @@ pub fn squares_at_delta(
 /// delta = eta (PM mean error), clipped to its range.
 pub fn squares_at_best_delta(
     problem: &Problem<'_>,
-    point: &Point,
+    point: &LinearPoint,
     parameters: &Parameters,
 ) -> Option<Vector3<f64>> {
     let ratios = Ratios::new(&point.ratios);

@@ -10,7 +10,7 @@ use runtime::capacitive::vertical_per_gap;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
+pub(super) struct ReferencedTick {
     pub(super) tick: Tick,
     pub(super) movement: i64,
     /// X, Y, Rz: m, m, rad.
@@ -19,7 +19,7 @@ pub(super) struct Row {
 
 impl Records<'_> {
     /// The rows of the fit, with the speed of the reference.
-    pub(super) fn field_rows(&self, rows: &[Row], clocks: &Clocks) -> Rows {
+    pub(super) fn field_rows(&self, rows: &[ReferencedTick], clocks: &Clocks) -> Rows {
         let hall_mm = self.stage.hall.m_per_count * 1e3;
         let gap_m = self.stage.capacitive.m_per_count;
         // A checked stage has its sensors in a triangle.
@@ -56,10 +56,10 @@ impl Records<'_> {
     }
 
     /// The ticks that have a reference.
-    pub(super) fn rows(&self, ticks: &[Tick], clocks: &Clocks) -> Vec<Row> {
+    pub(super) fn rows(&self, ticks: &[Tick], clocks: &Clocks) -> Vec<ReferencedTick> {
         let row = |tick: &Tick| {
             let (movement, pose) = self.at(clocks.on_reference_us(tick.t_us))?;
-            Some(Row {
+            Some(ReferencedTick {
                 tick: *tick,
                 movement,
                 pose,
@@ -89,12 +89,12 @@ impl Records<'_> {
 
     /// What the designed probes explain of the signals' motion, each with a factor for all rows and a
     /// constant for each movement, and that motion; codes squared.
-    pub(super) fn explained(&self, rows: &[Row]) -> [f64; 2] {
+    pub(super) fn explained(&self, rows: &[ReferencedTick]) -> [f64; 2] {
         let mut sums = [[0.0; 3]; 3];
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
             for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
                 let n = movement.len() as f64;
-                let pair = |row: &Row| {
+                let pair = |row: &ReferencedTick| {
                     let read = self.plane * Vector3::from(row.pose);
                     [f64::from(row.tick.codes.hall[k]), read[k]]
                 };
@@ -119,7 +119,7 @@ impl Records<'_> {
     }
 
     /// The share of the motion that is explained, if it is enough.
-    pub(super) fn share(&self, rows: &[Row]) -> Result<f64, ImportError> {
+    pub(super) fn share(&self, rows: &[ReferencedTick]) -> Result<f64, ImportError> {
         let [explained, motion] = self.explained(rows);
         match explained / motion {
             share if share >= EXPLAINED_MIN => Ok(share),
