@@ -92,6 +92,15 @@ pub struct Row {
     pub reference: [f64; 3],
 }
 
+impl Row {
+    /// The displacements of the beams X, Y1, Y2 by the reference, m.
+    pub fn beams_m(&self, y_baseline_m: f64) -> [f64; 3] {
+        let [x, y, rz] = self.reference;
+        let turned_m = 0.5 * y_baseline_m * rz.tan();
+        [x, y + turned_m, y - turned_m]
+    }
+}
+
 /// One movement of one log: between its start and its end the interferometers were not reset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Movement {

@@ -2,16 +2,19 @@
 
 use crate::choice::chosen;
 use crate::error::{arrays_error, log_error, wrong};
+use crate::finding;
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibration::words;
 use host_fit::input::axis::counted;
+use host_fit::input::channels::columns;
 use host_fit::input::dataset::Row;
 use host_fit::input::log::layout::LogLayout;
 use host_fit::input::log::{
     self, BadRows, LogError, LogReading, LogRow, ReadOptions, ReferenceUse,
 };
 use host_fit::input::stage::{Stage as Designed, TemperatureTable};
+use host_fit::report::channels::channels;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -148,6 +151,13 @@ impl Log {
     #[getter]
     fn warnings(&self) -> Vec<String> {
         words::messages(&self.reading.warnings)
+    }
+
+    /// The properties of each channel, as `host-fit check --json` writes them: a list of dicts.
+    #[getter]
+    fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let dataset = &self.reading.dataset;
+        finding::figures(py, &channels(&columns(dataset, &self.designed), dataset))
     }
 
     /// Time of the rows within their log, us: int64, (n,).

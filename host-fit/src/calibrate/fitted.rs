@@ -1,6 +1,7 @@
 //! A fit with the decisions around it.
 
 use super::{ErrorLimits, name_of};
+use crate::report::channels::channels;
 use crate::report::figure::{Group, group};
 use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
@@ -215,6 +216,7 @@ impl JudgedFit {
             "warnings" => json!(words::messages(&log.warnings)),
             "verdict" => json!(diagnosis.verdict),
             "findings" => json!(words::worded(&diagnosis.findings)),
+            "channels" => channels(&diagnosis.columns, &log.dataset),
         }
     }
 

@@ -8,7 +8,10 @@ use crate::calibrate::FitOrder;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
+use crate::report::channels::channels;
 use crate::report::parameters;
+use crate::report::table::Table;
+use crate::report::text::as_text;
 use clap::Args;
 use hallstage_calibration::words;
 use hallstage_input::log::ReadOptions;
@@ -103,6 +106,12 @@ impl Job<'_> {
             let designed = [("designed", parameters::designed(&stage))];
             details = report.figures.tables();
             details.splice(1..1, parameters::tables(&report.parameters, &designed));
+        }
+        if self.out.is_none() {
+            let channels = channels(&outcome.diagnosis.columns, &log.dataset);
+            let table = Table::from_groups("channels", &channels);
+            details.retain(|shown| *shown != table);
+            terminal::print(&as_text(&[table]))?;
         }
         let refusal = outcome.refusal_message();
         if let (Some(cause), Some(_)) = (&refusal, kept) {

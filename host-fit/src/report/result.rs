@@ -1,5 +1,6 @@
 //! The report of a fit, or of a blob that was judged: made once, shown as JSON, as tables and as a page.
 
+use super::channels::channels;
 use super::errors::{RowErrors, errors, errors_per_degree, errors_per_log};
 use super::field;
 use super::figure::{Figure, Group, Item, bare, figure, group};
@@ -96,6 +97,7 @@ impl Report {
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
     /// | `valid_up_to` | the rms acceleration and speed of all axes at once up to which they are good |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
+    /// | `channels` | properties of each column of the logs; empty for `eval` |
     /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
     pub fn from_judgement(judged: Judged) -> Self {
         let Judged {
@@ -136,6 +138,7 @@ impl Report {
             "valid_up_to" => json!(diagnosis.motion.map(valid_up_to)),
             "temperatures" => several(errors_per_degree(dataset, &judged.by_row)),
             "findings" => json!(words::worded(findings)),
+            "channels" => channels(&diagnosis.columns, dataset),
             "logs" => several(errors_per_log(dataset, judgement)),
             "trusted_inputs" => trusted(set),
             "refusal" => json!(refusal),

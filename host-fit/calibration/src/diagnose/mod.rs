@@ -3,6 +3,7 @@
 //! | module | what it does |
 //! |---|---|
 //! | [`signals`] | faults in the signals: missing rows, channels that stand still, outliers, hum |
+//! | `columns` | faults of single channels, found without a fit, with their cost in service |
 //! | [`faults`] | faults of channels by score tests, with their cost and their repair |
 //! | `mistakes` | mistakes with order, signs, scales and places |
 //! | [`structure`] | the mistake that explains a log |
@@ -32,6 +33,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod columns;
 pub mod faults;
 pub mod fit_checks;
 mod limits;
@@ -53,8 +55,10 @@ use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
+use columns::ColumnFaults;
 use faults::{Calibrated, Faults, find_faults};
 use hallstage_input::channel::Channel;
+use hallstage_input::channels::Column;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -75,6 +79,8 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Whether the calibration can be used; `None` for a blob where the log cannot predict its errors.
     pub verdict: Option<Verdict>,
+    /// The properties of each channel of the log; empty for a blob.
+    pub columns: Vec<Column>,
     /// The errors to expect in service; `None` where the log is too short or too still to predict them.
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log: see [`Fit::repaired`]. The verdict is about them.
@@ -93,6 +99,7 @@ pub fn diagnose_log(
     stage: &Stage,
     fitted: Result<&Fit, &FitError>,
 ) -> Diagnosis {
+    let logged = dataset;
     let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
@@ -134,6 +141,10 @@ pub fn diagnose_log(
     }
     let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
+    let columns = ColumnFaults::new(logged, stage, &best.parameters);
+    out.predicted = out.predicted.map(|predicted| columns.on_top_of(predicted));
+    out.findings.extend(columns.findings);
+    out.columns = columns.columns;
     let is_for_service = by.is_for_service;
     let basis = match fitted {
         Ok(_) => Basis::Fit { is_for_service },

@@ -53,6 +53,20 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("{rows} far outside the noise of {on}, by up to {largest_um:.1} µm. The default --loss cauchy gives them no weight")
         }
         Kind::Hum { frequency_hz, amplitude_um } => format!("{on} hums at {frequency_hz:.1} Hz with an amplitude of {amplitude_um:.2} µm"),
+        Kind::CoarseSteps { step_um, noise_um } => format!("{on} is written in steps of {step_um:.2} µm, and a Hall probe has {noise_um:.2} µm of noise{}", cost(found)),
+        Kind::StuckBits { bits, step_um } => {
+            let numbers: Vec<String> = bits.iter().map(u32::to_string).collect();
+            let (which, change) = if bits.len() == 1 { ("bit", "changes") } else { ("bits", "change") };
+            format!("{which} {} of {on} never {change}, so the values have gaps of up to {step_um:.2} µm{}", listed(&numbers), cost(found))
+        }
+        Kind::Noisy { noise_um, ratio } => format!("the noise of {on} is {noise_um:.2} µm, {ratio:.1} times the noise of the others{}", cost(found)),
+        Kind::SlowRate { rows, is_held, error_um } => {
+            let between = if *is_held { "hold the last one" } else { "are interpolated" };
+            format!("{on} has a new value in one of {rows} rows, and the rows between {between}. This takes about {error_um:.2} µm rms off the motion{}", cost(found))
+        }
+        Kind::LowPass {} => format!("the noise of {on} falls towards high frequencies like the noise of an average or a low-pass filter, which weakens and delays fast motion, too"),
+        Kind::Filled { rows } => format!("{on} runs on a straight line in {}, as where a gap was filled", counted(*rows, "row")),
+        Kind::Overflows { bits, times } => format!("{on} jumps by 2^{bits} codes {}: its counter of {bits} bits overflows", counted(*times, "time")),
         Kind::Change { quantity, course, size } => change(found, *quantity, course, *size),
         Kind::OtherState { log } => {
             let what = log.as_deref().unwrap_or("the log from here on");

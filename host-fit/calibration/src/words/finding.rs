@@ -133,6 +133,12 @@ mod tests {
             message(&stands),
             "Capacitive sensor 2 never changes. Is it connected?"
         );
+        let bits = vec![4, 5];
+        let stuck = Finding::new(Kind::StuckBits { bits, step_um: 3.0 });
+        let stuck = message(&stuck.with_channel(Channel::HallA).with_cost(2.0));
+        assert!(stuck.starts_with(
+            "Bits 4, 5 of Hall A never change, so the values have gaps of up to 3.00 µm. Alone it"
+        ));
         let refused = Finding::new(Kind::CodesRefused { rows: 3 });
         assert!(message(&refused).ends_with("the errors leave out."));
     }

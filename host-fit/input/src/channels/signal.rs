@@ -49,34 +49,21 @@ pub(super) fn signals<'a>(
 ) -> Vec<Signal<'a>> {
     let rows = &dataset.rows[log.rows.clone()];
     let has_gaps = rows.iter().all(|row| row.frame.capacitive().is_some());
-    let beam_pm = |row: &Row, beam: usize| {
-        let [x, y, rz] = row.reference;
-        let turned_m = 0.5 * stage.y_baseline_m * rz.tan();
+    let value = |row: &Row, k: usize| match k {
+        0..3 => f64::from(row.frame.hall()[k]),
         // Whole picometres: rounding on the way to a pose and back is far less.
-        (1e12 * [x, y + turned_m, y - turned_m][beam]).round()
+        3..6 => (1e12 * row.beams_m(stage.y_baseline_m)[k - 3]).round(),
+        _ => row
+            .frame
+            .capacitive()
+            .map_or(0.0, |codes| f64::from(codes[k - 6])),
     };
-    let signal = |k: usize| {
-        let (value, unit_m): (&dyn Fn(&Row) -> f64, f64) = match k {
-            0..3 => (
-                &|row| f64::from(row.frame.hall()[k]),
-                stage.hall.m_per_count,
-            ),
-            3..6 => (&|row| beam_pm(row, k - 3), 1e-12),
-            _ => (
-                &|row| {
-                    row.frame
-                        .capacitive()
-                        .map_or(0.0, |codes| f64::from(codes[k - 6]))
-                },
-                stage.capacitive.m_per_count,
-            ),
-        };
-        Signal {
-            channel: Channel::SINGLE[k],
-            values: rows.iter().map(value).collect(),
-            unit_m,
-            runs,
-        }
+    let units_m = [stage.hall.m_per_count, 1e-12, stage.capacitive.m_per_count];
+    let signal = |k: usize| Signal {
+        channel: Channel::SINGLE[k],
+        values: rows.iter().map(|row| value(row, k)).collect(),
+        unit_m: units_m[k / 3],
+        runs,
     };
     let is_there = |k: &usize| match k {
         0..3 => true,

@@ -159,6 +159,22 @@ kinds! {
     /// A line in the spectrum of a channel.
     Hum { frequency_hz: f64, amplitude_um: f64 } => Code::Hum, *frequency_hz, "Hz";
 
+    // Of each channel alone.
+    /// The values are whole steps.
+    CoarseSteps { step_um: f64, noise_um: f64 } => Code::Coarse, *step_um, "um";
+    /// Bits of a code that never change.
+    StuckBits { bits: Vec<u32>, step_um: f64 } => Code::StuckBit, *step_um, "um";
+    /// The noise over the noise of the other channels of the kind.
+    Noisy { noise_um: f64, ratio: f64 } => Code::Noisy, *ratio, "times";
+    /// New values come every few rows, and values between them are held or interpolated; the lost motion.
+    SlowRate { rows: usize, is_held: bool, error_um: f64 } => Code::Slow, *rows as f64, "rows";
+    /// The noise falls towards high frequencies by more than a sensor's does.
+    LowPass {} => Code::Slow;
+    /// A gap in a channel is filled by a line.
+    Filled { rows: usize } => Code::Slow, *rows as f64, "rows";
+    /// A counter with this number of bits overflows.
+    Overflows { bits: u32, times: usize } => Code::Overflow, *times as f64, "times";
+
     // Of the residuals.
     /// A change of a channel, in the unit of the quantity.
     Change { quantity: Quantity, course: TimeCourse, size: f64 } => code_of_change(*quantity, course), *size, quantity.unit();

@@ -1,0 +1,257 @@
+//! Each property is put into the shipped run, whose channels have none.
+
+use super::*;
+use crate::dataset::Row;
+use crate::log::{self, ReadOptions};
+use crate::shipped::{RUN_GZ, stage};
+use std::f64::consts::TAU;
+
+fn sound() -> Dataset {
+    let reading = log::read_bytes(RUN_GZ, "run.csv.gz".as_ref(), &stage(), &ReadOptions::FIT);
+    reading.expect("a log").dataset
+}
+
+fn column(dataset: &Dataset, channel: Channel) -> Column {
+    let mut columns = columns(dataset, &stage()).into_iter();
+    columns
+        .find(|column| column.channel == channel)
+        .expect("a channel")
+}
+
+/// The run with other values of beam X, nm, made from the old ones.
+fn with_beam_x(change: impl Fn(&[f64]) -> Vec<f64>) -> Column {
+    let mut dataset = sound();
+    let nm = |row: &Row| row.reference[0] * 1e9;
+    let values = change(&dataset.rows.iter().map(nm).collect::<Vec<f64>>());
+    for (row, nm) in dataset.rows.iter_mut().zip(values) {
+        row.reference[0] = nm.round() * 1e-9;
+    }
+    column(&dataset, Channel::BeamX)
+}
+
+/// The run with other codes of Hall A.
+fn with_hall_a(change: impl Fn(usize, i32) -> i32) -> Column {
+    let mut dataset = sound();
+    for (k, row) in dataset.rows.iter_mut().enumerate() {
+        row.frame.codes.hall[0] = change(k, row.frame.codes.hall[0]);
+    }
+    column(&dataset, Channel::HallA)
+}
+
+#[test]
+fn a_sound_log_has_the_noise_of_its_sensors_and_no_fault() {
+    let stage = stage();
+    let units_m = [stage.hall.m_per_count, 1e-9, stage.capacitive.m_per_count];
+    for (k, column) in columns(&sound(), &stage).iter().enumerate() {
+        let unit_m = units_m[k / 3];
+        let noise = column.white_noise_m.expect("rows") / unit_m;
+        let near = [7.5..8.5, 5.0..6.5, 0.7..1.3][k / 3].contains(&noise);
+        assert!(near, "{:?}: {noise}", column.channel);
+        assert!((column.step_m / unit_m - 1.0).abs() < 1e-9);
+        assert!((column.to_siblings.expect("three") - 1.0).abs() < 0.1);
+        let [low, high] = column.falls.expect("500 rows a second");
+        assert!(low < 1.0 && high < 0.45, "{low} {high}");
+        assert!((column.noise_change - 1.15).abs() < 0.15);
+        assert_eq!(
+            (column.slow, &column.straight, column.overflows),
+            (None, &None, None)
+        );
+        assert_eq!(column.stuck_bits, Vec::<u32>::new());
+    }
+}
+
+#[test]
+fn a_step_divides_all_differences() {
+    let rounded = with_beam_x(|nm| nm.iter().map(|nm| (nm / 50.0).round() * 50.0).collect());
+    assert!((rounded.step_m * 1e9 - 50.0).abs() < 1e-6 && rounded.is_rounded());
+    assert_eq!(with_hall_a(|_, _| 7).step_m, 0.0);
+}
+
+#[test]
+fn a_bit_that_never_changes_is_named_and_motion_of_its_size_is_none() {
+    assert_eq!(with_hall_a(|_, code| code | 1 << 5).stuck_bits, [5]);
+    assert_eq!(with_hall_a(|_, code| code & !(1 << 9)).stuck_bits, [9]);
+    assert_eq!(
+        with_hall_a(|k, _| (k % 16) as i32).stuck_bits,
+        Vec::<u32>::new()
+    );
+}
+
+#[test]
+fn a_counter_that_overflows_has_its_bits_and_an_outlier_is_none() {
+    let wrapped = with_hall_a(|_, code| (code + 2048).rem_euclid(4096) - 2048);
+    assert_eq!(wrapped.overflows.map(|(bits, _)| bits), Some(12));
+    let sparks = with_hall_a(|k, code| code + if k % 1000 == 7 { 4096 } else { 0 });
+    assert_eq!(sparks.overflows, None);
+}
+
+#[test]
+fn a_slow_rate_is_named_with_its_error() {
+    for every in [2, 5, 10, 25] {
+        let held = with_beam_x(|nm| (0..nm.len()).map(|k| nm[k - k % every]).collect());
+        let slow = held.slow.expect("held");
+        assert_eq!((slow.every, slow.is_held), (every, true));
+        let lines = |nm: &[f64]| -> Vec<f64> {
+            let line = |k: usize| {
+                let (start, part) = (k - k % every, (k % every) as f64 / every as f64);
+                let end = (start + every).min(nm.len() - 1);
+                nm[start] + part * (nm[end] - nm[start])
+            };
+            (0..nm.len()).map(line).collect()
+        };
+        let slow = with_beam_x(lines).slow.expect("interpolated");
+        assert_eq!((slow.every, slow.is_held), (every, false));
+        let dataset = sound();
+        let nm: Vec<f64> = dataset
+            .rows
+            .iter()
+            .map(|row| row.reference[0] * 1e9)
+            .collect();
+        let squares = nm
+            .iter()
+            .zip(lines(&nm))
+            .map(|(true_nm, nm)| (true_nm - nm).powi(2));
+        let error_m = 1e-9 * (squares.sum::<f64>() / nm.len() as f64).sqrt();
+        // The noise of 6 nm is no motion.
+        assert!(
+            (slow.error_m - error_m).abs() < 0.1 * error_m + 8e-9,
+            "{every}: {slow:?} {error_m}"
+        );
+    }
+}
+
+#[test]
+fn a_line_in_the_spectrum_is_no_slow_rate() {
+    let hum = |k: usize| 40.0 * libm::sin(TAU * 120.0 * 0.002 * k as f64);
+    assert_eq!(with_hall_a(|k, code| code + hum(k) as i32).slow, None);
+    let beam = with_beam_x(|nm| {
+        nm.iter()
+            .enumerate()
+            .map(|(k, nm)| nm + 12.0 * hum(k))
+            .collect()
+    });
+    assert_eq!(beam.slow, None);
+    let [low, high] = beam.falls.expect("rows");
+    assert!(low < 3.0 && high < 1.0, "{low} {high}");
+}
+
+#[test]
+fn a_filter_makes_noise_fall_faster_than_drift_does() {
+    let low_pass = |nm: &[f64]| {
+        let mut state = nm[0];
+        let part = 1.0 - libm::exp(-TAU * 10.0 * 0.002);
+        let next = |nm: &f64| {
+            state += part * (nm - state);
+            state
+        };
+        nm.iter().map(next).collect()
+    };
+    let mean = |nm: &[f64]| {
+        let window = |k: usize| &nm[k.saturating_sub(25)..nm.len().min(k + 25)];
+        (0..nm.len())
+            .map(|k| window(k).iter().sum::<f64>() / window(k).len() as f64)
+            .collect()
+    };
+    for filtered in [with_beam_x(low_pass), with_beam_x(mean)] {
+        let [low, high] = filtered.falls.expect("rows");
+        assert!(low > 3.0 && high > 1.0, "{low} {high}");
+    }
+}
+
+#[test]
+fn a_line_that_fills_a_gap_is_a_straight_run_and_a_level_one_is_not() {
+    let filled = |level: f64| {
+        with_beam_x(|nm| {
+            let line = |k: usize| nm[5000] + (k - 5000) as f64 * level;
+            let value = |(k, nm): (usize, &f64)| {
+                if (5000..5100).contains(&k) {
+                    line(k)
+                } else {
+                    *nm
+                }
+            };
+            nm.iter().enumerate().map(value).collect()
+        })
+    };
+    let straight = filled(300.0).straight.expect("a line");
+    assert!(
+        straight.start.abs_diff(5000) < 3 && straight.end.abs_diff(5100) < 3,
+        "{straight:?}"
+    );
+    assert_eq!(filled(0.0).straight, None);
+}
+
+#[test]
+fn noise_is_compared_with_siblings_and_over_time() {
+    let noisy = |from: usize| {
+        with_hall_a(move |k, code| {
+            let random = (k as i32).wrapping_mul(1_103_515_245).wrapping_add(12_345) >> 8;
+            if k < from {
+                code
+            } else {
+                code + random.rem_euclid(101) - 50
+            }
+        })
+    };
+    let ratio = noisy(0).to_siblings.expect("three");
+    assert!((3.0..5.5).contains(&ratio), "{ratio}");
+    let late = noisy(14_000);
+    assert!(
+        late.noise_change > 3.0 && late.to_siblings < Some(1.2),
+        "{late:?}"
+    );
+}
+
+#[test]
+fn missing_rows_thinned_rows_and_short_movements_are_no_fault() {
+    let all = sound();
+    let missing: Vec<usize> = (0..all.rows.len()).filter(|row| row % 17 == 5).collect();
+    let mut short = sound();
+    short.movements.clear();
+    for start in (0..15_000).step_by(20) {
+        short.movements.push(crate::dataset::Movement {
+            log: 0,
+            index: start as i64,
+            rows: start..start + 20,
+        });
+    }
+    for (k, row) in short.rows.iter_mut().enumerate() {
+        row.movement = k / 20;
+    }
+    let mut thinned = all.without(&(0..15_000).filter(|row| row % 5 != 0).collect::<Vec<_>>());
+    thinned.logs[0].rows = 0..3000;
+    let mut gaps = all.without(&missing);
+    gaps.logs[0].rows = 0..gaps.rows.len();
+    for dataset in [gaps, short, thinned] {
+        for column in columns(&dataset, &stage()) {
+            assert_eq!(
+                (column.slow, &column.straight, column.falls),
+                (None, &None, None),
+                "{column:?}"
+            );
+            assert!(
+                (column.to_siblings.expect("noise") - 1.0).abs() < 0.15,
+                "{column:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn fast_motion_of_the_stage_is_no_filter() {
+    let mut dataset = sound();
+    let mut state = [0.0f64; 2];
+    for (k, row) in dataset.rows.iter_mut().enumerate() {
+        // Steps of 200 um through two filters of 20 Hz.
+        let to = if (k / 250) % 2 == 0 { 200e-6 } else { 0.0 };
+        state[0] += 0.22 * (to - state[0]);
+        state[1] += 0.22 * (state[0] - state[1]);
+        row.reference[0] += state[1];
+        row.frame.codes.hall = row
+            .frame
+            .codes
+            .hall
+            .map(|code| code + (state[1] * 16e6) as i32);
+    }
+    assert_eq!(column(&dataset, Channel::BeamX).falls, None);
+}

@@ -1,0 +1,30 @@
+//! The table of channels: the properties of each column of a log.
+
+use super::figure::{Figure, Group, figure, group};
+use hallstage_input::channels::Column;
+use hallstage_input::dataset::Dataset;
+
+/// A group for each channel of each log.
+pub fn channels(columns: &[Column], dataset: &Dataset) -> Vec<Group> {
+    let of_column = |column: &Column| {
+        let um = |m: f64| figure(m * 1e6, "um");
+        let ratio = |x: f64| figure((x * 1e3).round() * 1e-3, "");
+        let several = dataset.logs.len() > 1;
+        let between = |slow: bool| if slow { "held" } else { "interpolated" };
+        group! {
+            "channel" => column.channel.name(),
+            "log" => several.then(|| dataset.logs[column.log].name()),
+            "step" => um(column.step_m),
+            "noise" => column.white_noise_m.map(um),
+            "to_siblings" => column.to_siblings.map(ratio),
+            "noise_change" => ratio(column.noise_change),
+            "falls" => column.falls.map(|falls| Figure::from_iter(falls.map(ratio))),
+            "rows_per_value" => column.slow.map(|slow| slow.every),
+            "rows_between" => column.slow.map(|slow| between(slow.is_held)),
+            "straight_rows" => column.straight.as_ref().map(ExactSizeIterator::len),
+            "stuck_bits" => Figure::from_iter(column.stuck_bits.iter().copied()),
+            "overflows" => column.overflows.map(|(_, times)| times),
+        }
+    };
+    columns.iter().map(of_column).collect()
+}
