@@ -269,6 +269,7 @@ impl Lines {
                         "# no column for the movement: one begins after a gap in time"
                     );
                 }
+                [] if Quantity::COMMANDED.contains(&quantity) => {}
                 [] => {
                     // Only one of alternative sets is needed.
                     let alternatives: [&[_]; 2] = [&Quantity::REFERENCES, &Quantity::VERTICALS];

@@ -64,6 +64,8 @@ pub enum ReferenceUse {
     Required,
     /// It may hold it; see [`crate::dataset::LogSource::has_reference`].
     IfPresent,
+    /// It may hold the commanded pose, which stands in the place of the reference.
+    Commanded,
 }
 
 /// How to read logs.

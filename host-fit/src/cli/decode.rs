@@ -60,6 +60,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let settings = DecodeSettings {
         decoder: &set.decoder(),
         on_invalid: args.hold,
+        correction: set.motion_correction.as_ref(),
         posterior: posterior.as_ref(),
         format: args.format,
         watch: interrupt::watch(),
@@ -72,6 +73,11 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     );
     for (name, rows) in counts.named() {
         summary.push_str(&format!("  {rows} rows: {name}\n"));
+    }
+    if log.has_reference && set.motion_correction.is_some() {
+        summary.push_str(
+            "  poses corrected by the commanded motion of the log (cmd_x, cmd_y, cmd_rz)\n",
+        );
     }
     terminal::print(&summary)?;
     super::wrote([args.out.clone()])?;

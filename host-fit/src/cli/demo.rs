@@ -161,6 +161,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     posterior_file::add_calibration(&mut outputs, &files[6], &field.set, known.as_ref())?;
     outputs.commit()?;
     let decoding = DecodeSettings {
+        correction: None,
         decoder: &model_31.set.decoder(),
         on_invalid: OnInvalid::Zero,
         posterior: None,

@@ -14,8 +14,12 @@
 //! With uncertainties a line ends with three more fields, `u_x_um,u_y_um,u_rz_urad`: the standard
 //! uncertainty of X, Y, Rz, four significant digits.
 //!
+//! X, Y, Rz of a log with a commanded pose are corrected by its speed and acceleration, if the parameters have a
+//! motion correction.
+//!
 //! [`PoseFormat::Npy`] is the same in binary: see `npy.rs`.
 
+mod commanded;
 mod npy;
 mod stream;
 mod summary;

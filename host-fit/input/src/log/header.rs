@@ -28,7 +28,7 @@ pub(super) struct Columns {
     pub(super) hall: [Source; 3],
     /// The gaps, or Z, Rx, Ry.
     pub(super) vertical: Set,
-    /// The beams, or X, Y, Rz.
+    /// The beams, or X, Y, Rz, or the commanded X, Y, Rz.
     pub(super) reference: Option<Set>,
     /// Temperatures of mount and body.
     pub(super) temperature: [Option<Source>; 2],
@@ -66,10 +66,13 @@ pub(super) fn columns(
     let [time] = header.all([Quantity::Time])?;
     let hall = header.all(Quantity::HALL)?;
     let vertical = header.one_of(&Quantity::VERTICALS)?;
-    let sets = Quantity::REFERENCES;
+    let sets: &[[Quantity; 3]] = match reference {
+        ReferenceUse::Commanded => &[Quantity::COMMANDED],
+        _ => &Quantity::REFERENCES,
+    };
     let is_there = sets.iter().flatten().any(|q| header.find(*q).is_some());
     let is_needed = is_there || reference == ReferenceUse::Required;
-    let reference = is_needed.then(|| header.one_of(&sets)).transpose()?;
+    let reference = is_needed.then(|| header.one_of(sets)).transpose()?;
     Ok(Columns {
         movement,
         time,

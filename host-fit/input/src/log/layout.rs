@@ -9,6 +9,7 @@
 //! | `cap_1`, `cap_2`, `cap_3` | `cap1_cnt`, `cap2_cnt`, `cap3_cnt` | capacitive codes |
 //! | `gap_1`, `gap_2`, `gap_3` | `gap1_m`, `gap2_m`, `gap3_m` | gaps as lengths, in place of the codes |
 //! | `z`, `rx`, `ry` | `z_m`, `rx_rad`, `ry_rad` | vertical pose, in place of the codes |
+//! | `cmd_x`, `cmd_y`, `cmd_rz` | `cmd_x_m`, `cmd_y_m`, `cmd_rz_rad` | commanded pose |
 //! | `hall_a`, `hall_b`, `hall_c` | `hall_a_cnt`, `hall_b_cnt`, `hall_c_cnt` | Hall codes |
 //!
 //! A column that `[log]` does not name is also known by its key, or by its default name with another unit in any
@@ -82,6 +83,9 @@ quantities! {
     X, "x", "x_m", Length, "", "reference pose", ["x" "xref" "stagex" "posx" "xpos"];
     Y, "y", "y_m", Length, "", "reference pose", ["y" "yref" "stagey" "posy" "ypos"];
     Rz, "rz", "rz_rad", Angle, "", "reference pose", ["rz" "rzref" "thetaz" "yaw" "rotz"];
+    CommandedX, "cmd_x", "cmd_x_m", Length, "", "commanded pose, for decode", ["cmdx" "commandedx" "xcmd" "setx"];
+    CommandedY, "cmd_y", "cmd_y_m", Length, "", "commanded pose, for decode", ["cmdy" "commandedy" "ycmd" "sety"];
+    CommandedRz, "cmd_rz", "cmd_rz_rad", Angle, "", "commanded pose, for decode", ["cmdrz" "commandedrz" "rzcmd" "setrz"];
     Gap1, "cap_1", "cap1_cnt", Code, "capacitive", "capacitive sensor, in the order of probes_m", ["cap1" "capacitive1" "gap1" "capa"];
     Gap2, "cap_2", "cap2_cnt", Code, "capacitive", "capacitive sensor, in the order of probes_m", ["cap2" "capacitive2" "gap2" "capb"];
     Gap3, "cap_3", "cap3_cnt", Code, "capacitive", "capacitive sensor, in the order of probes_m", ["cap3" "capacitive3" "gap3" "capc"];
@@ -109,6 +113,8 @@ impl Quantity {
     pub const BEAMS: [Self; 3] = [Self::BeamX, Self::BeamY1, Self::BeamY2];
     /// The reference pose in SI units.
     pub const PLANAR: [Self; 3] = [Self::X, Self::Y, Self::Rz];
+    /// The commanded pose in SI units.
+    pub const COMMANDED: [Self; 3] = [Self::CommandedX, Self::CommandedY, Self::CommandedRz];
     /// Alternative sets for the reference.
     pub const REFERENCES: [[Self; 3]; 2] = [Self::BEAMS, Self::PLANAR];
     /// Alternative sets for the vertical pose.

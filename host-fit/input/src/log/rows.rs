@@ -176,7 +176,7 @@ impl<'a> RowReader<'a> {
             return Ok([0.0; 3]);
         };
         let (x, y) = (length(x)?, length(y)?);
-        if set == Quantity::PLANAR {
+        if set != Quantity::BEAMS {
             return Ok([x, y, scaled(row, z, ROTATION_MAX_RAD, "rad")?]);
         }
         let (y1, y2) = (y, length(z)?);

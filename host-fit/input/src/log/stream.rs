@@ -92,6 +92,11 @@ impl<'a> LogRows<'a> {
         })
     }
 
+    /// Whether it holds the interferometers' reference, or the pose in its place.
+    pub const fn has_reference(&self) -> bool {
+        self.reader.columns.reference.is_some()
+    }
+
     /// The median time between the first rows, us.
     pub const fn period_us(&self) -> f64 {
         self.order.period_us

@@ -33,7 +33,7 @@
 
 pub mod blocks;
 pub mod clocks;
-mod derivatives;
+pub mod derivatives;
 pub mod draw;
 pub mod dynamics;
 pub mod error;

@@ -1,12 +1,13 @@
 //! From a log to its pose file, in little memory however long they are.
 
+use super::commanded::Commanded;
 use super::{PoseRow, StatusCounts, npy, text, uncertainty};
 use crate::output::{Output, OutputError};
-use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions};
+use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
 use hallstage_solver::estimator::posterior::Posterior;
-use runtime::{AnyDecoder, OnInvalid, PlanarPose, PoseTracker};
+use runtime::{AnyDecoder, MotionCorrection, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 
 /// Bytes that are written at once.
@@ -29,6 +30,8 @@ pub struct DecodeSettings<'a> {
     pub decoder: &'a AnyDecoder,
     /// What invalid fields read.
     pub on_invalid: OnInvalid,
+    /// The correction by commanded motion, for a log that holds the commanded pose.
+    pub correction: Option<&'a MotionCorrection>,
     /// What is known of the decoder's errors, where uncertainties are to be written.
     pub posterior: Option<&'a Posterior>,
     /// How poses are written.
@@ -73,9 +76,15 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
     let mut counts = StatusCounts::default();
     let options = ReadOptions {
         watch: settings.watch,
+        reference: match settings.correction {
+            Some(_) => ReferenceUse::Commanded,
+            None => ReferenceUse::IfPresent,
+        },
         ..ReadOptions::DECODE
     };
     let mut log = LogRows::open(log, "decoding", stage, &options)?;
+    let commanded = settings.correction.filter(|_| log.has_reference());
+    let mut commanded = commanded.map(Commanded::new);
     let mut bytes = settings.header(0);
     let rows = loop {
         let row = match log.next_row() {
@@ -87,18 +96,27 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
         }
         let frame = &row.row.frame;
         let reading = frame.decode(decoder, &PlanarPose::ZERO);
-        let row = PoseRow {
+        let pose = PoseRow {
             movement: row.movement,
             t_us: row.row.t_us,
             reading: tracker.tick_with(frame.sequence(), |_| reading),
         };
-        counts.add(row.reading.status);
-        settings.write(&row, &mut bytes);
+        counts.add(pose.reading.status);
+        let poses = match &mut commanded {
+            Some(commanded) => commanded.take(&row, pose),
+            None => vec![pose],
+        };
+        poses
+            .iter()
+            .for_each(|pose| settings.write(pose, &mut bytes));
         if bytes.len() >= PIECE_BYTES {
             out.write(&bytes)?;
             bytes.clear();
         }
     };
+    for pose in commanded.iter_mut().flat_map(|of| of.corrected(true)) {
+        settings.write(&pose, &mut bytes);
+    }
     out.write(&bytes)?;
     rows?;
     if settings.format == PoseFormat::Npy {

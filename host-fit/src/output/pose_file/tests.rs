@@ -2,7 +2,9 @@ use super::*;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::watch::Watch;
 use proptest::prelude::*;
-use runtime::{AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, Status, VerticalPose};
+use runtime::{
+    AnyDecoder, MotionCorrection, OnInvalid, PlanarPose, Pose, PoseTracker, Status, VerticalPose,
+};
 use std::path::Path;
 
 /// Runs the decoder over all rows as a controller would.
@@ -146,19 +148,27 @@ fn words(row: &PoseRow) -> Vec<u32> {
 
 /// A log decoded into a file: its bytes and the counts.
 fn decoded_file(log: &Path, on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCounts) {
+    decoded_with(log, &settings(&decoder(), on_invalid, format))
+}
+
+fn settings(decoder: &AnyDecoder, on_invalid: OnInvalid, format: PoseFormat) -> DecodeSettings<'_> {
+    DecodeSettings {
+        decoder,
+        on_invalid,
+        correction: None,
+        posterior: None,
+        format,
+        watch: Watch::NONE,
+    }
+}
+
+fn decoded_with(log: &Path, settings: &DecodeSettings<'_>) -> (Vec<u8>, StatusCounts) {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let stage = hallstage_input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("pose");
     let out = crate::output::Output::create(&path).expect("writable");
-    let settings = DecodeSettings {
-        decoder: &decoder(),
-        on_invalid,
-        posterior: None,
-        format,
-        watch: Watch::NONE,
-    };
-    let decoded = decode_log::<Box<dyn std::error::Error>>(log, &stage, &settings, out);
+    let decoded = decode_log::<Box<dyn std::error::Error>>(log, &stage, settings, out);
     let (counts, end) = decoded.expect("sound");
     assert_eq!((end.skipped_rows, end.warnings), (0, Vec::new()));
     (std::fs::read(&path).expect("written"), counts)
@@ -202,6 +212,53 @@ fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
             assert_eq!(found[..6], words(row));
             assert_eq!(found[6], row.reading.status.bits());
         }
+    }
+}
+
+#[test]
+fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
+    let (acceleration, rows) = (1e-6, 9000);
+    let mut log = "movement,t_us,cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt,cmd_x_m,cmd_y_m,cmd_rz_rad\n".to_owned();
+    for row in 0..rows {
+        let t_s = 2e-3 * f64::from(row);
+        let x_m = 0.5 * acceleration * t_s * t_s;
+        log += &format!("0,{},40,50,60,1000,200,-300,{x_m:e},0,0\n", 2000 * row);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, log).expect("written");
+    let mut correction = MotionCorrection {
+        acceleration_s2: [[0.0; 3]; 3],
+        velocity_s: [[0.0; 3]; 3],
+    };
+    (
+        correction.velocity_s[0][0],
+        correction.acceleration_s2[1][0],
+    ) = (10.0, 20.0);
+    let decoder = decoder();
+    let planar = |correction| {
+        let settings = DecodeSettings {
+            correction,
+            ..settings(&decoder, OnInvalid::Zero, PoseFormat::Csv)
+        };
+        let poses = parse(&decoded_with(&path, &settings).0);
+        poses
+            .into_iter()
+            .map(|row| row.reading.pose.planar)
+            .collect::<Vec<_>>()
+    };
+    let (corrected, plain) = (planar(Some(&correction)), planar(None));
+    assert_eq!(
+        (corrected.len(), plain.len()),
+        (rows as usize, rows as usize)
+    );
+    for (row, (corrected, plain)) in corrected.iter().zip(&plain).enumerate() {
+        let added = [corrected.x_m - plain.x_m, corrected.y_m - plain.y_m].map(f64::from);
+        let wanted = [10.0 * acceleration * 2e-3 * row as f64, 20.0 * acceleration];
+        for (added, wanted) in added.into_iter().zip(wanted) {
+            assert!((added - wanted).abs() < 2e-8, "{row}: {added} {wanted}");
+        }
+        assert_eq!(corrected.rz_rad, plain.rz_rad);
     }
 }
 
