@@ -24,6 +24,7 @@ mod encoding;
 pub mod finding;
 pub mod log;
 pub mod log_format;
+mod resets;
 mod sample;
 pub mod shipped;
 pub mod source;

@@ -27,8 +27,9 @@ pub use cell::CellFault;
 pub use error::{LogError, LogProblem, Place};
 pub use stream::{LogEnd, LogRow, LogRows};
 
+use crate::channel::Channel;
 use crate::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
-use crate::finding::{Finding, Kind};
+use crate::finding::{Finding, Kind, Severity};
 use crate::sample::Sampler;
 use crate::stage::Stage;
 use crate::text::TextReader;
@@ -215,6 +216,18 @@ fn read_texts<'t>(
         return Err(Place::new("", None).refuse(LogProblem::NoLog));
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());
+    let resets = reading.dataset.split_at_resets(stage.y_baseline_m);
+    if let Some(&first) = resets.first() {
+        let kind = Kind::Resets {
+            resets: resets.len(),
+        };
+        let found = Finding::new(kind)
+            .with_severity(Severity::Note)
+            .with_channel(Channel::Beams);
+        let (row, dataset) = (&reading.dataset.rows[first], &reading.dataset);
+        let name = dataset.movement_name(&dataset.movements[row.movement]);
+        reading.warnings.push(found.with_place(name, row.t_us));
+    }
     reading.dataset.compensate_as_expected(&stage.temperature);
     let (rows, _) = reading.dataset.read();
     let (taken, runs) = (reading.dataset.rows.len(), reading.dataset.movements.len());

@@ -27,6 +27,7 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::MovementsByTime { movements, gap_rows, .. } => {
             format!("there is no column for the movement. The times separate {}: one begins after a gap of more than {gap_rows} rows and where the time starts again", counted(*movements, "movement"))
         }
+        Kind::Resets { resets } => format!("beams jump {} and the Hall probes do not, as where an interferometer is reset or slips. A movement ends there", counted(*resets, "time")),
         Kind::BetweenCodes { mean_codes, .. } => format!("voltages are {mean_codes:.2} codes from whole codes on average"),
         Kind::Excerpt { rows, taken, runs } => format!("the fit and the diagnosis use {taken} of {rows} rows, in {}", counted(*runs, "run")),
         Kind::RowsSkipped { reason, rows, line, column, name, .. } => {

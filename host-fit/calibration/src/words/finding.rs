@@ -57,6 +57,7 @@ fn remedy(found: &Finding) -> String {
         }
         Kind::Mistake { code, causes, may_be_magnets, .. } => return mistake_remedy(*code, causes, *may_be_magnets),
         Kind::InMotion { shows_acceleration: false, .. } => "record the run of host-fit plan, whose second tone shows it, or evaluate on your fastest motion",
+        Kind::Resets { .. } => "log resets as movements",
         Kind::SingleRows { .. } => "check the movement column",
         Kind::RowsMissing { .. } => "look for frames that the recorder lost",
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",

@@ -130,6 +130,8 @@ kinds! {
     FileCut { file: String, line: usize } => Code::FileCut;
     /// Movements are separated by the time, after a gap of more than `gap_rows` rows and where the time starts again.
     MovementsByTime { file: String, movements: usize, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
+    /// Beams jump and the probes do not, as where interferometers are reset or slip.
+    Resets { resets: usize } => Code::Step, *resets as f64, "resets";
     /// Mean distance of voltages from whole codes.
     BetweenCodes { file: String, mean_codes: f64 } => Code::BetweenCodes, *mean_codes, "codes";
     /// A fit uses `taken` rows in `runs` of rows that follow each other.

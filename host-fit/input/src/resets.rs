@@ -1,0 +1,153 @@
+//! Resets of the interferometers and slips of a beam that no column shows: beams jump, and the Hall probes do not.
+//!
+//! A movement ends there, so that each part has its own zero deviation.
+
+use super::dataset::{Dataset, Movement, Row};
+
+/// Rows on either side of a jump.
+const ROWS: usize = 6;
+/// The parabola through every other row on one side, half a row before the first.
+const NEAR: [f64; 3] = [1.406_25, -0.562_5, 0.156_25];
+/// The same without the first row.
+const FAR: [f64; 3] = [2.406_25, -2.062_5, 0.656_25];
+/// Motion over some rows is a parabola within a part of this, m. A smaller jump costs nothing.
+const LEAST_M: f64 = 1e-6;
+/// A jump without the rows beside it is the same within this part; a spike is not.
+const STAYS_PART: f64 = 0.2;
+/// Hall probes that jump by more than this part show a motion, ...
+const HALL_PART: f64 = 0.4;
+/// ... or jump by their noise, four standard deviations, m.
+const HALL_NOISE_M: f64 = 4.5e-6;
+/// Consecutive rows are closer than this many periods.
+const GAP_PERIODS: f64 = 1.5;
+
+impl Dataset {
+    /// Ends movements where beams jump and the probes do not, and returns the first rows of the new movements.
+    pub fn split_at_resets(&mut self, y_baseline_m: f64) -> Vec<usize> {
+        let mut resets = Vec::new();
+        for (log, source) in self
+            .logs
+            .iter()
+            .enumerate()
+            .filter(|(_, log)| log.has_reference)
+        {
+            let period_s = self.period_s(source.rows.clone()).unwrap_or(f64::INFINITY);
+            for movement in self.movements.iter().filter(|movement| movement.log == log) {
+                let rows = &self.rows[movement.rows.clone()];
+                let found = in_movement(rows, y_baseline_m, 1e6 * GAP_PERIODS * period_s);
+                resets.extend(found.into_iter().map(|row| movement.rows.start + row));
+            }
+        }
+        for &row in resets.iter().rev() {
+            let number = self.rows[row].movement;
+            let end = std::mem::replace(&mut self.movements[number].rows.end, row);
+            let second = Movement {
+                rows: row..end,
+                ..self.movements[number]
+            };
+            self.movements.insert(number + 1, second);
+            self.rows[row..]
+                .iter_mut()
+                .for_each(|row| row.movement += 1);
+        }
+        resets
+    }
+}
+
+/// The first rows after jumps.
+fn in_movement(rows: &[Row], y_baseline_m: f64, gap_us: f64) -> Vec<usize> {
+    let beams = |row: &Row| {
+        let [x, y, rz] = row.reference;
+        let turned_m = 0.5 * y_baseline_m * rz;
+        [x, y + turned_m, y - turned_m]
+    };
+    // The largest jump of a beam at a row, where it is no motion and stays.
+    let jump = |here: usize| -> Option<f64> {
+        let window = rows.get(here.checked_sub(ROWS)?..here + ROWS)?;
+        let [near, far] = [NEAR, FAR].map(|weights| jumps(window, weights, beams));
+        let most = near
+            .iter()
+            .fold(0.0, |most: f64, jump| most.max(jump.abs()));
+        let stays = |k: usize| (far[k] - near[k]).abs() < STAYS_PART * most;
+        let seen_m = jumps(window, NEAR, |row| row.signal_m).map(f64::abs);
+        let is_seen = seen_m
+            .iter()
+            .any(|jump| *jump > f64::max(HALL_PART * most, HALL_NOISE_M));
+        let is_even = || {
+            window
+                .windows(2)
+                .all(|two| ((two[1].t_us - two[0].t_us) as f64) < gap_us)
+        };
+        (most > LEAST_M && (0..3).all(stays) && !is_seen && is_even()).then_some(most)
+    };
+    let all: Vec<Option<f64>> = (0..rows.len()).map(jump).collect();
+    let is_largest = |here: &usize| {
+        let around = &all[here.saturating_sub(ROWS)..(here + ROWS).min(all.len())];
+        all[*here].is_some() && around.iter().all(|other| *other <= all[*here])
+    };
+    (0..rows.len()).filter(is_largest).collect()
+}
+
+/// Jumps in the middle of a window.
+fn jumps(window: &[Row], weights: [f64; 3], of: impl Fn(&Row) -> [f64; 3]) -> [f64; 3] {
+    let skipped = usize::from(weights == FAR);
+    let mut sum = [0.0; 3];
+    for (k, weight) in weights.into_iter().enumerate() {
+        let away = skipped + 2 * k;
+        let [before, after] = [ROWS - 1 - away, ROWS + away].map(|row| of(&window[row]));
+        (0..3).for_each(|of| sum[of] += weight * (after[of] - before[of]));
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::dataset::Dataset;
+    use crate::log::{self, ReadOptions};
+    use crate::shipped::{RUN_GZ, stage};
+
+    fn run() -> Dataset {
+        let reading = log::read_bytes(RUN_GZ, "run".as_ref(), &stage(), &ReadOptions::FIT);
+        reading.expect("a log").dataset
+    }
+
+    fn add(dataset: &mut Dataset, from: usize, to: usize, jump_um: [f64; 3]) {
+        for row in &mut dataset.rows[from..to] {
+            for (pose, jump_um) in row.reference.iter_mut().zip(jump_um) {
+                *pose += 1e-6 * jump_um;
+            }
+        }
+    }
+
+    #[test]
+    fn a_movement_ends_where_beams_jump_and_the_probes_do_not() {
+        let baseline_m = stage().y_baseline_m;
+        let mut log = run();
+        assert!(log.split_at_resets(baseline_m).is_empty());
+        let (end, count) = (log.rows.len(), log.movements.len());
+        add(&mut log, 4321, end, [2.0, -1.5, 10.0]);
+        add(&mut log, 9876, end, [-40.0, 0.0, 0.0]);
+        assert_eq!(log.split_at_resets(baseline_m), [4321, 9876]);
+        assert_eq!(log.movements.len(), count + 2);
+        for (number, movement) in log.movements.iter().enumerate() {
+            let rows = &log.rows[movement.rows.clone()];
+            assert!(rows.iter().all(|row| row.movement == number), "{number}");
+        }
+    }
+
+    #[test]
+    fn spikes_and_motion_end_no_movement() {
+        let baseline_m = stage().y_baseline_m;
+        let mut spike = run();
+        add(&mut spike, 4321, 4322, [20.0, -15.0, 10.0]);
+        assert!(spike.split_at_resets(baseline_m).is_empty());
+        let mut motion = run();
+        let end = motion.rows.len();
+        add(&mut motion, 4321, end, [20.0, -15.0, 0.0]);
+        for row in &mut motion.rows[4321..] {
+            let [a, b, c] = &mut row.signal_m;
+            (*a, *b, *c) = (*a - 15e-6, *b - 15e-6, *c + 20e-6);
+        }
+        assert!(motion.split_at_resets(baseline_m).is_empty());
+    }
+}
