@@ -33,6 +33,14 @@ const WEAK: f64 = 0.01;
 /// Sum of squared distances over tolerances of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
 
+/// Magnets of another workshop are up to this many times the tolerances off: what they cost is seen in the residuals
+/// and the prediction.
+const UNUSUAL_MAX: f64 = 2.0;
+/// Farther off, several mistakes at once are likely.
+const STRANGE_MAX: f64 = 4.0;
+/// Mistakes are linear. Where a linear model leaves more than this part of the variance of a signal, none is the cause.
+const LEFT_MAX: f64 = 0.1;
+
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
 
@@ -75,10 +83,15 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let least = ranked.first()?.0;
     let gain = as_logged - least;
     if least > SOUND_MAX || gain < likely {
-        return (as_logged > SOUND_MAX).then(|| {
-            let tolerances = (as_logged / SOUND_MAX).sqrt();
-            Finding::new(Kind::OtherProbes { tolerances })
-        });
+        let tolerances = (as_logged / SOUND_MAX).sqrt();
+        let severity = match tolerances {
+            ..1.0 => return None,
+            ..UNUSUAL_MAX => Severity::Note,
+            ..STRANGE_MAX => Severity::Warn,
+            _ => Severity::Refuse,
+        };
+        let found = Finding::new(Kind::OtherProbes { tolerances });
+        return Some(found.with_severity(severity));
     }
     let near = ranked
         .iter()
@@ -208,6 +221,7 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
     let of_probe = |probe: usize| {
         let mut at = SVector::<f64, UNKNOWNS>::zeros();
         let mut covariance = SMatrix::zeros();
+        let (mut variance, mut left) = (f64::MIN_POSITIVE, 1.0);
         for _ in 0..ROUNDS {
             let column = |row: &FieldRow| {
                 let [q, rate] = [row.reference_mm, row.rate_mm_per_s].map(Vector3::from);
@@ -230,18 +244,21 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
                 count += columns.len() as f64;
             }
             let rest = products[(UNKNOWNS, UNKNOWNS)] / count;
+            variance = variance.max(rest);
             let mut own = products.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
             let open = (WEAK * rest).max(f64::MIN_POSITIVE);
             own += SMatrix::from_diagonal_element(open);
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
             covariance = factor.inverse() * (rest * alike);
+            left = rest / variance;
         }
         let found = Fitted {
             at: at.fixed_rows::<6>(0).into(),
             covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
         };
-        found.at.iter().all(|x| x.is_finite()).then_some(found)
+        let is_linear = left < LEFT_MAX && found.at.iter().all(|x| x.is_finite());
+        is_linear.then_some(found)
     };
     Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
 }

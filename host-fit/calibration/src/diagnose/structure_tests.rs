@@ -241,3 +241,30 @@ fn a_mistake_is_more_likely_where_nothing_else_describes_the_log() {
     let is_named = causes(&found).iter().any(|(named, _)| *named == GapPlaces);
     assert!(is_named, "{found:?}");
 }
+
+/// A signal without its sign, a converter that wraps: no change of scales, signs and places leads there.
+#[test]
+fn what_is_not_linear_is_no_mistake_with_channels() {
+    let stage = stage("", "");
+    let folded = datasets(&stage, |s| s.hall[1] = s.hall[1].abs());
+    let wrapped = datasets(&stage, |s| {
+        s.hall[1] = i32::from((s.hall[1] + 32_768) as i16)
+    });
+    for dataset in folded.into_iter().chain(wrapped) {
+        assert_eq!(structure(&dataset, &stage, true), None);
+    }
+}
+
+#[test]
+fn two_mistakes_at_once_are_refused_without_a_name() {
+    let stage = stage("", "");
+    let two = datasets(&stage, |s| {
+        s.hall[0] *= -1;
+        s.beams_nm[0] *= -1;
+    });
+    for dataset in two {
+        let found = structure(&dataset, &stage, false).expect("a finding");
+        assert!(matches!(found.kind, Kind::OtherProbes { .. }), "{found:?}");
+        assert_eq!(found.severity, Severity::Refuse);
+    }
+}

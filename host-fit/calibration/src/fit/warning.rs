@@ -8,8 +8,9 @@ use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
-use hallstage_input::stage::Stage;
+use hallstage_input::stage::{Range, Stage};
 use hallstage_solver::estimator::least_squares::at_limit;
+use hallstage_solver::estimator::model::ParameterId;
 use hallstage_solver::estimator::motion::shown;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
 use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
@@ -18,6 +19,8 @@ use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 const LAG_MIN: f64 = 0.1;
 /// ... and from this many of its standard errors.
 const LAG_ERRORS_MIN: f64 = 3.0;
+/// A sensitivity farther beyond its range, in parts of the range, may be a wrong scale.
+const SCALE_PART: f64 = 0.05;
 /// In a million rows of noise alone the largest error is five times the rms.
 const PEAK_TO_RMS_MAX: f64 = 8.0;
 
@@ -91,6 +94,19 @@ impl Fit {
         let mut warnings = Vec::new();
         let parameters = self.estimate.parameters.model_31();
         let at_limit = at_limit(stage, self.model, &parameters);
+        // No range bounds the field model, so it lacks nothing there. But no residual shows a wrong scale.
+        let is_scale = |id: &ParameterId| {
+            let ranges = stage.search.get("eta").filter(|_| id.term.name == "eta");
+            ranges.is_some_and(|ranges| {
+                let (range, eta) = (ranges[id.probe], parameters.values[id.index]);
+                let room = SCALE_PART * range.width();
+                !Range::new(range.low - room, range.high + room).contains(eta)
+            })
+        };
+        let severity = |is_scale: bool| match self.field {
+            Some(_) if !is_scale => Severity::Note,
+            _ => Severity::Warn,
+        };
         for id in &at_limit {
             let value = parameters.values[id.index];
             let unit = id.term.unit;
@@ -100,14 +116,15 @@ impl Fit {
                 value,
                 unit,
             };
-            warnings.push(Finding::new(kind).with_channel(Channel::SINGLE[id.probe]));
+            let found = Finding::new(kind).with_channel(Channel::SINGLE[id.probe]);
+            warnings.push(found.with_severity(severity(is_scale(id))));
         }
         let vertical = at_limit.iter().filter(|id| id.is_slope()).count();
         if vertical > 1 {
             let kind = Kind::VerticalAtLimit {
                 parameters: vertical,
             };
-            warnings.push(Finding::new(kind));
+            warnings.push(Finding::new(kind).with_severity(severity(false)));
         }
         warnings.extend(wild_row(dataset, &self.judgement));
         if self.model.has_zero_deviation {
