@@ -179,6 +179,23 @@ impl Estimate {
         DVector::from_fn(UNKNOWNS, |k, _| self.squares[(k, UNKNOWNS + fault)])
     }
 
+    /// The covariance of all unknowns. Where terms are larger than usual, also the others are, and their prior pulls
+    /// them to zero: squares over the number of terms that the log determines show how much (MacKay 1992).
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
+        let own = self.curvature.inverse();
+        let mut prior = DMatrix::zeros(own.nrows(), own.nrows());
+        let (mut squares, mut count) = (0.0, 0.0);
+        for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
+            prior[(k, k)] = self.prior[(k, k)];
+            squares += self.prior[(k, k)] * self.at.values[k] * self.at.values[k];
+            count += 1.0 - self.prior[(k, k)] * own[(k, k)];
+        }
+        // A fault that is not found bends terms, too: harsh magnets fill their prior, no more.
+        let part = (squares / count.max(1.0)).clamp(USUAL_PART * USUAL_PART, 1.0);
+        let over_usual = part / (USUAL_PART * USUAL_PART);
+        &own + &own * (prior * (over_usual - 1.0)) * &own
+    }
+
     /// The curvature of a fit without faults, with the first `free` parameters of each probe.
     pub(super) fn without_faults(&self, free: usize) -> Option<Factor> {
         let is_free = |unknown: usize| unknown >= COUNT || unknown % PER_PROBE < free;
@@ -223,5 +240,50 @@ impl Estimate {
             found = Some((values, covariance));
         }
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hallstage_input::shipped::stage;
+    use hallstage_simulate::assembly::Assembly;
+    use hallstage_simulate::protocol::Protocol;
+    use hallstage_simulate::recording::record;
+    use hallstage_simulate::sensors::SensorErrors;
+    use hallstage_solver::estimator::paper::Parameters;
+
+    #[test]
+    fn terms_that_are_larger_than_usual_make_also_the_hidden_ones_uncertain() {
+        let (stage, seed) = (stage(), 3);
+        let mut run = Protocol::Combined.run(stage.servo_period_s, seed);
+        run.movements.truncate(1);
+        let assembly = Assembly::draw(&stage, seed);
+        let log = record(&stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear");
+        let log = log.dataset(&stage).expect("a triangle");
+        let designed = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
+        let means = Means::new(&log, &stage, &designed, true);
+        let mut estimate = Estimate::first(&means, &designed, &[]).expect("an estimate");
+        let own = estimate.curvature.inverse();
+        assert_eq!(estimate.covariance(), own, "usual magnets");
+        for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
+            estimate.at.values[k] = 2.0 / self_prior(&estimate, k);
+        }
+        let more = estimate.covariance();
+        let grown = |k: usize| more[(k, k)] / own[(k, k)];
+        // uz3 is as uncertain as its prior, eta is known from the log.
+        assert!(grown(term("uz3")) > 3.0, "{}", grown(term("uz3")));
+        assert!(grown(term("eta")) < 2.0, "{}", grown(term("eta")));
+    }
+
+    fn term(name: &str) -> usize {
+        TERMS
+            .iter()
+            .position(|term| term.name == name)
+            .expect("a term")
+    }
+
+    fn self_prior(estimate: &Estimate, k: usize) -> f64 {
+        estimate.prior[(k, k)].sqrt()
     }
 }

@@ -318,7 +318,7 @@ impl Finder<'_> {
             // The lag is part of all that bent the fit.
             findings.insert(0, self.finding(&fault, late_ms, own_cost));
         }
-        let covariance = estimate.curvature.inverse() * inflation;
+        let covariance = estimate.covariance() * inflation;
         let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
         // Other models lack terms, and are not for service.
         let unexplained = match self.calibrated.model {
@@ -380,7 +380,7 @@ impl Finder<'_> {
         inflation: f64,
     ) -> Option<(Predicted, Vec<f64>)> {
         let (values, covariance) = match self.calibrated.model {
-            ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
+            ModelKind::Field => (estimate.values(), estimate.covariance()),
             _ => estimate.with_usual_terms()?,
         };
         let own = self.calibrated.parameters.probes.as_flattened();
