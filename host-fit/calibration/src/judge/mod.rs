@@ -108,7 +108,7 @@ impl Decoded {
         corrected
     }
 
-    /// The rows whose errors are near the errors around them: not those where the reference jumps for a moment.
+    /// The rows with errors near the errors around them. A row where the reference jumps for a moment is not among them.
     fn trusted(&self, dataset: &Dataset) -> Vec<bool> {
         const AROUND: usize = 2;
         let jump = |row: usize| {

@@ -10,7 +10,7 @@ use runtime::{MotionCorrection, PlanarMotion, PlanarPose, Status};
 /// Rows that are corrected at once.
 const PIECE_ROWS: usize = 8192;
 
-/// Poses of a movement that wait for the rows after them: these tell their speed and acceleration.
+/// Poses of a movement. They wait for the next rows, which give speed and acceleration.
 pub(super) struct Commanded<'a> {
     correction: &'a MotionCorrection,
     /// Rows with the commanded pose as reference; the last are the rows of the poses.
@@ -30,7 +30,7 @@ impl<'a> Commanded<'a> {
         }
     }
 
-    /// Takes a pose with its row, and gives the poses whose motion is known.
+    /// Takes a pose with its row, and gives the poses of known motion.
     pub(super) fn take(&mut self, row: &LogRow, pose: PoseRow) -> Vec<PoseRow> {
         let is_due = row.begins || self.poses.len() >= PIECE_ROWS;
         let known = is_due.then(|| self.corrected(row.begins));
@@ -39,7 +39,7 @@ impl<'a> Commanded<'a> {
         known.unwrap_or_default()
     }
 
-    /// The corrected poses: all at the end of a movement, else those whose motion is known.
+    /// The corrected poses: all at the end of a movement, before it the poses of known motion.
     pub(super) fn corrected(&mut self, is_end: bool) -> Vec<PoseRow> {
         let known_us = match self.rows.last() {
             Some(last) if !is_end => last.t_us - SIDE_US,
