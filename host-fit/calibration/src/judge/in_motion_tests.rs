@@ -129,9 +129,14 @@ fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
 }
 
 #[test]
-fn one_late_probe_is_told_once() {
+fn one_late_probe_is_named_and_stays_late_in_service() {
     let (_, _, diagnosis, _) = calibrated(MotionEffects::draw([1e-3, 0.0, 0.0], None, None, SEED));
     let codes: Vec<Code> = diagnosis.findings.iter().map(Finding::code).collect();
-    assert_eq!(codes, [Code::Motion], "{:?}", diagnosis.findings);
+    assert_eq!(codes, [Code::Motion, Code::ReferenceLag]);
+    let named = crate::words::message(&diagnosis.findings[1]);
+    assert!(
+        named.contains("In service the channel stays late"),
+        "{named}"
+    );
     assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
 }

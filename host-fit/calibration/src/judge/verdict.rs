@@ -149,11 +149,6 @@ fn hides(cause: &Finding, found: &Finding) -> bool {
         // Where a channel stops and goes on, others seem to jump.
         Code::Step => is_same_movement && found.channels() != cause.channels(),
         Code::ZeroClipped => cause.place.is_none() || is_same_movement,
-        // A late probe is told with the errors of motion.
-        Code::ReferenceLag if cause.code() == Code::Motion => found
-            .channels()
-            .iter()
-            .any(|channel| Channel::SINGLE[..3].contains(channel)),
         // A line in the spectrum of a beam looks like a lag.
         Code::ReferenceLag => cause
             .channels()

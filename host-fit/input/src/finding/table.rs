@@ -94,7 +94,7 @@ codes! {
     ZeroClipped, "zero_clipped", Note, "zero deviations are beyond their range", "reset the interferometers nearer to zero, or widen search.delta_m in stage.toml", [TermsAtLimit], Kept, ALWAYS;
     TermsAtLimit, "terms_at_limit", Warn, "parameters stand at an end of their search range", "check the scales and signs of the log; if they are right, widen the range in stage.toml", [], Lost, None;
     OutOfRange, "out_of_range", Warn, "the log covers less than service, or a blob is used beyond its range", "record a log of the full range (host-fit plan)", [], Kept, WARN;
-    Motion, "motion", Warn, "speed or acceleration in service makes the pose wrong", "evaluate on your fastest motion, apply the correction (runtime/README.md), or declare a slower service in [motion]", [ReferenceLag], Lost, None;
+    Motion, "motion", Warn, "speed or acceleration in service makes the pose wrong", "evaluate on your fastest motion, apply the correction (runtime/README.md), or declare a slower service in [motion]", [], Lost, None;
     ModelLacks, "model_lacks", Warn, "the log shows more than the model describes, or cannot carry a better model", "see the other findings; move all six axes at once", [], Lost, WARN;
     NotDetermined, "not_determined", Refuse, "the log does not determine the calibration well enough for service", "record all six axes moving at once over the range of service, for longer (host-fit plan makes such a run)", [], Kept, None;
     RowsSkipped, "rows_skipped", Warn, "rows or movements are left out because a cell is bad", "record them again if they matter", [], Kept, WARN;
