@@ -32,6 +32,7 @@ use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::{Fit, RANGE_MARGIN, calibration};
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
+use hallstage_input::channels::columns;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::error::FieldFitError;
@@ -196,7 +197,12 @@ pub fn recalibrate(
     let judged =
         |set: &ParameterSet| Decoded::new(set, dataset).judge(dataset, stage, Zeros::Refit);
     let judgement_before = judged(old);
-    let (_, bad) = signal_findings(dataset, stage, (&old_parameters, 0.0));
+    let (_, bad) = signal_findings(
+        dataset,
+        stage,
+        &columns(dataset, stage),
+        (&old_parameters, 0.0),
+    );
     let covariance = known.map(|known| &known.covariance);
     let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
     let update = update(

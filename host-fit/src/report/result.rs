@@ -97,7 +97,7 @@ impl Report {
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
     /// | `valid_up_to` | the rms acceleration and speed of all axes at once up to which they are good |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
-    /// | `channels` | properties of each column of the logs; empty for `eval` |
+    /// | `channels` | properties of each column of the logs |
     /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
     pub fn from_judgement(judged: Judged) -> Self {
         let Judged {

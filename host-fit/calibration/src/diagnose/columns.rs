@@ -5,7 +5,7 @@ use super::slopes::Slopes;
 use crate::judge::predicted::{Predicted, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::{Column, columns};
+use hallstage_input::channels::{Column, SlowRate};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -25,104 +25,101 @@ const FALLS_OF_BEAM: [f64; 2] = [3.0, 1.0];
 /// are held for 5 and 10 rows or interpolated over 5 to 25.
 const BENDS: f64 = 0.75;
 
-const PROBES: [Channel; 3] = [Channel::HallA, Channel::HallB, Channel::HallC];
-
 /// The noise of a beam is that of its reading, and no motion, below this part of the noise of a probe.
 const QUIET: f64 = 1.0 / 200.0;
 
-/// A fault of a channel.
-struct Fault {
-    kind: Kind,
-    size: Size,
-}
+const PROBES: [Channel; 3] = [Channel::HallA, Channel::HallB, Channel::HallC];
 
-/// What a fault does.
-enum Size {
-    /// A probe or a gap has this error in service, m2.
+/// The effect of a fault.
+enum Effect {
+    /// A probe or a gap has an error with this variance in service, m2.
     Variance(f64),
-    /// A calibration is bent by this error of the reference, m.
+    /// The reference has an error that follows the motion, rms m.
     Bent(f64),
-    /// Nothing tells.
+    /// Nothing shows its size.
     Unknown,
 }
 
-/// The faults of the channels of all logs, and their variances over the noise floor of X, Y, Rz in service, all
-/// together.
+/// The faults of the channels of all logs, one for each channel.
 pub(super) struct ColumnFaults {
-    pub(super) columns: Vec<Column>,
     pub(super) findings: Vec<Finding>,
-    /// The variances of X, Y, Rz without these faults and the variances that the faults add: m2, m2, rad2.
+    /// The variances of X, Y, Rz in service without these faults and the variances that the faults add: m2, m2, rad2.
     floor: [f64; 3],
     added: [f64; 3],
+    /// The variances of the noise of probes that are noisier than their siblings: other predictions have them.
+    beyond: [f64; 3],
 }
 
 impl ColumnFaults {
     /// `parameters`: for the effect of an error of a channel on the pose.
-    pub(super) fn new(dataset: &Dataset, stage: &Stage, parameters: &FieldParameters) -> Self {
-        let columns = columns(dataset, stage);
+    pub(super) fn new(
+        columns: &[Column],
+        dataset: &Dataset,
+        stage: &Stage,
+        parameters: &FieldParameters,
+    ) -> Self {
         let is_probe = |column: &&Column| PROBES.contains(&column.channel);
         let noise = columns.iter().filter(is_probe).filter_map(noise_m);
         let noise_m = median(&mut noise.collect::<Vec<f64>>()).unwrap_or(0.0);
         let by_channel = variances(stage, parameters);
-        let floor = [0, 1, 2].map(|axis| {
-            let by_probe = by_channel[..3].iter().map(|by| by[axis]).sum::<f64>();
-            by_probe * noise_m * noise_m
-        });
-        let mut out = Self {
-            columns: Vec::new(),
-            findings: Vec::new(),
-            floor,
-            added: [0.0; 3],
-        };
-        for column in &columns {
-            let mut all = Channel::SINGLE.iter().zip(by_channel);
-            let own = all.find(|(channel, _)| **channel == column.channel);
-            let by = own.map_or([0.0; 3], |(_, by)| by);
-            let mut most = [0.0; 3];
+        let by_probes = |axis: usize| by_channel[..3].iter().map(|by| by[axis]).sum::<f64>();
+        let floor = [0, 1, 2].map(|axis| by_probes(axis) * noise_m * noise_m);
+        let (mut findings, mut added, mut beyond) = (Vec::new(), [0.0; 3], [0.0; 3]);
+        for column in columns {
             let log = &dataset.logs[column.log];
-            for Fault { kind, size } in faults(column, noise_m, log.rows.len()) {
+            let mut all = Channel::SINGLE.iter().zip(by_channel);
+            let by = all.find(|(channel, _)| **channel == column.channel);
+            if let (Some((_, by)), true) = (by, is_probe(&column)) {
+                let more_m2 = beyond_m2(column);
+                (0..3).for_each(|axis| beyond[axis] += by[axis] * more_m2);
+            }
+            let in_service = |effect: Effect| match effect {
+                Effect::Variance(m2) => Some(by?.1.map(|by| by * m2)),
+                Effect::Bent(m) => Some(floor.map(|floor| floor * (BENDS * m / noise_m).powi(2))),
+                Effect::Unknown => None,
+            };
+            let with_cost = |(kind, effect): (Kind, Effect)| {
                 let mut found = Finding::new(kind).with_channel(column.channel);
                 found.log = (dataset.logs.len() > 1).then(|| log.name());
-                let added = match size {
-                    Size::Variance(m2) => Some(by.map(|by| by * m2)),
-                    Size::Bent(error_m) => {
-                        Some(floor.map(|floor| floor * (BENDS * error_m / noise_m).powi(2)))
-                    }
-                    Size::Unknown => None,
+                let Some(own) = in_service(effect) else {
+                    return (found, [0.0; 3]);
                 };
-                if let Some(added) = added.filter(|_| noise_m > 0.0) {
-                    let ratios = added
-                        .iter()
-                        .zip(&floor)
-                        .map(|(added, floor)| (1.0 + added / floor).sqrt());
-                    let cost = ratios.fold(1.0, f64::max);
-                    found = found.with_severity(severity(cost)).with_cost(cost);
-                    // Steps and missing bits are in the noise, too.
-                    most = [0, 1, 2].map(|axis| f64::max(most[axis], added[axis]));
+                let ratio = |axis: usize| (1.0 + own[axis] / floor[axis]).sqrt();
+                let cost = [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max);
+                (found.with_severity(severity(cost)).with_cost(cost), own)
+            };
+            // Harmless properties are in the table of channels only.
+            let faults = faults(column, noise_m, log.rows.len()).map(with_cost);
+            let worst = faults.filter(|(found, _)| found.severity > Severity::Note);
+            for (found, own) in worst.take(1) {
+                findings.push(found);
+                for (all, own) in added.iter_mut().zip(own) {
+                    // The beams are slow together.
+                    let is_beam = column.channel.is_beam();
+                    *all = if is_beam { own.max(*all) } else { own + *all };
                 }
-                // Harmless properties are in the table of channels.
-                if found.severity > Severity::Note {
-                    out.findings.push(found);
-                }
-            }
-            let is_beam = column.channel.is_beam();
-            for (all, most) in out.added.iter_mut().zip(most) {
-                // The beams are slow together.
-                *all = if is_beam { all.max(most) } else { *all + most };
             }
         }
-        Self { columns, ..out }
+        Self {
+            findings,
+            floor,
+            added,
+            beyond,
+        }
     }
 
-    /// The errors to expect in service with these faults over the noise floor without them. A prediction has some of
-    /// them as noise of the probes.
+    /// The errors to expect in service with these faults over the noise floor without them. A prediction has the noise of
+    /// the probes already.
     pub(super) fn on_top_of(&self, predicted: Predicted) -> Predicted {
         match self.added {
             [0.0, 0.0, 0.0] => predicted,
             added => {
                 let noise = [0, 1, 2].map(|axis| predicted.noise(axis).powi(2));
-                let change = [0, 1, 2].map(|axis| added[axis] + self.floor[axis] - noise[axis]);
-                predicted.with_added(change).over(self.floor)
+                let change = |axis: usize| {
+                    let change = added[axis] + self.floor[axis] - noise[axis] - self.beyond[axis];
+                    change.max(self.floor[axis] - predicted.rms[axis].powi(2))
+                };
+                predicted.with_added([0, 1, 2].map(change)).over(self.floor)
             }
         }
     }
@@ -153,87 +150,86 @@ fn noise_m(column: &Column) -> Option<f64> {
     Some(noise_m2.max(rounding_m2 / 3.0).sqrt())
 }
 
-/// The faults of a channel of a log with `rows` rows; the Hall probes have this noise.
-fn faults(column: &Column, probe_noise_m: f64, rows: usize) -> Vec<Fault> {
-    let is_beam = column.channel.is_beam();
-    let is_probe = PROBES.contains(&column.channel);
-    let is_stuck = !column.stuck_bits.is_empty();
-    let noise_m = column.white_noise_m.unwrap_or(0.0);
-    let mut faults = Vec::new();
-    let is_coarse = column.step_m > 1.5 * column.unit_m;
-    let mut add = |kind: Kind, size: Size| faults.push(Fault { kind, size });
-    if let Some((bits, times)) = column.overflows {
-        add(Kind::Overflows { bits, times }, Size::Unknown);
-    }
-    let rounding_m2 = column.step_m * column.step_m / 12.0;
-    let coarse = Kind::CoarseSteps {
-        step_um: 1e6 * column.step_m,
-        noise_um: 1e6 * probe_noise_m,
-    };
-    match is_beam {
-        true if rounding_m2 > probe_noise_m * probe_noise_m => add(coarse, Size::Unknown),
-        false if is_coarse => add(coarse, Size::Variance(rounding_m2)),
-        _ => {}
-    }
-    if is_stuck {
-        let steps_m = (column.stuck_bits.iter()).map(|bit| f64::from(1 << bit) * column.unit_m);
-        let kind = Kind::StuckBits {
-            bits: column.stuck_bits.clone(),
-            step_um: 1e6 * steps_m.clone().sum::<f64>(),
-        };
-        // Half of the values are off by the bit.
-        let variance_m2 = steps_m.map(|step_m| 0.25 * step_m * step_m).sum();
-        add(kind, Size::Variance(variance_m2));
-    }
-    if let Some(ratio) = column.to_siblings
-        && ratio > NOISY
-        && !is_beam
-        && !is_stuck
-        && !column.is_rounded()
-    {
-        let kind = Kind::Noisy {
-            noise_um: 1e6 * noise_m,
-            ratio,
-        };
-        let usual_m2 = (noise_m / ratio).powi(2);
-        add(kind, Size::Variance(noise_m * noise_m - usual_m2));
-    }
-    let [low, high] = column.falls.unwrap_or_default();
-    let falls = low > FALLS_OF_BEAM[0] && high > FALLS_OF_BEAM[1];
-    let is_filtered = match is_beam {
-        true => falls && noise_m < QUIET * probe_noise_m,
-        // Stuck bits, overflows and coarse steps fall, too.
-        false => {
-            let has_other = is_coarse || is_stuck || column.overflows.is_some();
-            is_probe && !has_other && high > FALL_OF_PROBE
+/// The variance of the noise of a channel beyond the noise of its siblings, m2; 0 unless it is noisy.
+fn beyond_m2(column: &Column) -> f64 {
+    match (column.white_noise_m, column.to_siblings) {
+        (Some(noise_m), Some(ratio)) if ratio > NOISY => {
+            noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio))
         }
+        _ => 0.0,
+    }
+}
+
+/// The faults of a channel of a log with `rows` rows, causes before their consequences; the Hall probes have this noise.
+fn faults(
+    column: &Column,
+    probe_noise_m: f64,
+    rows: usize,
+) -> impl Iterator<Item = (Kind, Effect)> + use<> {
+    let is_beam = column.channel.is_beam();
+    let noise_m = column.white_noise_m.unwrap_or(0.0);
+    let overflow = |(bits, times)| (Kind::Overflows { bits, times }, Effect::Unknown);
+    let rounding_m2 = column.step_m * column.step_m / 12.0;
+    let is_coarse = match is_beam {
+        true => rounding_m2 > probe_noise_m * probe_noise_m,
+        false => column.step_m > 1.5 * column.unit_m,
     };
-    if let Some(slow) = column.slow {
-        let kind = Kind::SlowRate {
-            rows: slow.every,
-            is_held: slow.is_held,
-            error_um: 1e6 * slow.error_m,
-        };
-        let size = match is_beam {
-            true => Size::Bent(slow.error_m),
-            false => Size::Unknown,
-        };
-        add(kind, size);
-    } else if is_filtered {
-        add(Kind::LowPass {}, Size::Unknown);
-    }
-    if let Some(straight) = &column.straight
-        && severity_of_share(straight.len() as f64 / rows as f64) > Severity::Note
-    {
-        let rows = straight.len();
-        add(Kind::Filled { rows }, Size::Unknown);
-    }
-    faults
+    let (step_um, noise_um) = (1e6 * column.step_m, 1e6 * probe_noise_m);
+    let steps = Kind::CoarseSteps { step_um, noise_um };
+    let bits_m = (column.stuck_bits.iter()).map(|bit| f64::from(1 << bit) * column.unit_m);
+    let stuck = Kind::StuckBits {
+        bits: column.stuck_bits.clone(),
+        step_um: 1e6 * bits_m.clone().sum::<f64>(),
+    };
+    let is_stuck = !column.stuck_bits.is_empty();
+    // Half of the values are off by the bit.
+    let stuck_m2 = bits_m.map(|bit_m| 0.25 * bit_m * bit_m).sum();
+    let slow = |slow: SlowRate| Kind::SlowRate {
+        rows: slow.every,
+        is_held: slow.is_held,
+        error_um: 1e6 * slow.error_m,
+    };
+    let [low, high] = column.falls.unwrap_or_default();
+    let is_quiet = noise_m < QUIET * probe_noise_m;
+    let is_filtered = match is_beam {
+        true => is_quiet && low > FALLS_OF_BEAM[0] && high > FALLS_OF_BEAM[1],
+        false => PROBES.contains(&column.channel) && high > FALL_OF_PROBE,
+    };
+    let is_noisy = |ratio: &f64| *ratio > NOISY && !is_beam && !column.is_rounded();
+    let noisy = |ratio: f64| {
+        let noise_um = 1e6 * noise_m;
+        (
+            Kind::Noisy { noise_um, ratio },
+            Effect::Variance(beyond_m2(column)),
+        )
+    };
+    let filled = column.straight.as_ref().map(ExactSizeIterator::len);
+    let share = |filled: usize| severity_of_share(filled as f64 / rows as f64);
+    let filled = filled.filter(|&filled| share(filled) > Severity::Note);
+    let of_steps = match is_beam {
+        true => Effect::Unknown,
+        false => Effect::Variance(rounding_m2),
+    };
+    let of_rate = |slow: SlowRate| match is_beam {
+        true => Effect::Bent(slow.error_m),
+        false => Effect::Unknown,
+    };
+    let faults = [
+        column.overflows.map(overflow),
+        is_coarse.then_some((steps, of_steps)),
+        is_stuck.then_some((stuck, Effect::Variance(stuck_m2))),
+        column.slow.map(|rate| (slow(rate), of_rate(rate))),
+        is_filtered.then_some((Kind::LowPass {}, Effect::Unknown)),
+        column.to_siblings.filter(is_noisy).map(noisy),
+        filled.map(|rows| (Kind::Filled { rows }, Effect::Unknown)),
+    ];
+    faults.into_iter().flatten()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hallstage_input::channels::columns;
     use hallstage_input::dataset::Row;
     use hallstage_input::finding::Code;
     use hallstage_input::log::{self, ReadOptions};
@@ -248,7 +244,7 @@ mod tests {
         let rows = dataset.rows.iter_mut().enumerate();
         rows.for_each(|(k, row)| fault(k, row));
         let parameters = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
-        ColumnFaults::new(&dataset, &stage, &parameters)
+        ColumnFaults::new(&columns(&dataset, &stage), &dataset, &stage, &parameters)
     }
 
     /// The only finding: its code, channel and cost.
@@ -284,14 +280,18 @@ mod tests {
             "{cost}"
         );
         let faults = faults_of(stuck(5));
-        let noise = [0, 1, 2].map(|axis| (faults.floor[axis] + 0.5 * faults.added[axis]).sqrt());
-        let range = noise.map(|noise| [noise; 2]);
-        let with_half = Predicted {
-            rms: noise,
-            ratio: [1.0; 3],
-            range,
+        assert!(
+            faults.beyond[0] > 0.1 * faults.added[0],
+            "{:?}",
+            faults.beyond
+        );
+        let rms = [0, 1, 2].map(|axis| (faults.floor[axis] + faults.beyond[axis]).sqrt());
+        let with_noise = Predicted {
+            rms,
+            ratio: [0, 1, 2].map(|axis| rms[axis] / faults.floor[axis].sqrt()),
+            range: rms.map(|rms| [rms; 2]),
         };
-        let ratio = faults.on_top_of(with_half).worst_ratio();
+        let ratio = faults.on_top_of(with_noise).worst_ratio();
         assert!((ratio - cost).abs() < 1e-9, "{ratio} {cost}");
         assert_eq!(
             faults_of(stuck(1)).findings,

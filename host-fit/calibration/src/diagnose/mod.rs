@@ -58,7 +58,7 @@ use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
 use faults::{Calibrated, Faults, find_faults};
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::Column;
+use hallstage_input::channels::{Column, columns};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -79,7 +79,7 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Whether the calibration can be used; `None` for a blob where the log cannot predict its errors.
     pub verdict: Option<Verdict>,
-    /// The properties of each channel of the log; empty for a blob.
+    /// The properties of each channel of the log.
     pub columns: Vec<Column>,
     /// The errors to expect in service; `None` where the log is too short or too still to predict them.
     pub predicted: Option<Predicted>,
@@ -121,7 +121,10 @@ pub fn diagnose_log(
         is_fitted: fitted.is_ok(),
         shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.shows_acceleration),
     };
-    let mut out = Diagnosis::default();
+    let mut out = Diagnosis {
+        columns: columns(logged, stage),
+        ..Diagnosis::default()
+    };
     // A log that determines no parameters shows nothing of its channels.
     let is_described = match fitted {
         Ok(_) => true,
@@ -141,10 +144,9 @@ pub fn diagnose_log(
     }
     let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
-    let columns = ColumnFaults::new(logged, stage, &best.parameters);
+    let columns = ColumnFaults::new(&out.columns, logged, stage, &best.parameters);
     out.predicted = out.predicted.map(|predicted| columns.on_top_of(predicted));
     out.findings.extend(columns.findings);
-    out.columns = columns.columns;
     let is_for_service = by.is_for_service;
     let basis = match fitted {
         Ok(_) => Basis::Fit { is_for_service },
@@ -240,7 +242,8 @@ impl Diagnosis {
         (by, lag_s): (Calibrated, f64),
         is_described: bool,
     ) {
-        let (findings, bad) = signals::signal_findings(dataset, stage, (by.start, lag_s));
+        let (findings, bad) =
+            signals::signal_findings(dataset, stage, &self.columns, (by.start, lag_s));
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
@@ -373,7 +376,10 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    let mut out = Diagnosis::default();
+    let mut out = Diagnosis {
+        columns: columns(dataset, stage),
+        ..Diagnosis::default()
+    };
     out.add_faults(dataset, dataset, stage, (by, 0.0), true);
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;

@@ -1,5 +1,7 @@
 //! The signals of one log, channel by channel.
 
+use hallstage_input::channel::Channel;
+use hallstage_input::channels::Column;
 use hallstage_input::dataset::{Dataset, LogSource, Row};
 use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
@@ -17,6 +19,8 @@ pub(super) struct LogSignals<'a> {
     /// The values by channel and row, m, in the order of
     /// [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE); gaps only if the log has codes.
     pub(super) channels: Vec<Vec<f64>>,
+    /// The step of the values of each channel, m.
+    pub(super) steps_m: [f64; 9],
     /// Whether later tests use a row.
     pub(super) usable: Vec<bool>,
     /// Median time between rows, s.
@@ -24,7 +28,12 @@ pub(super) struct LogSignals<'a> {
 }
 
 impl<'a> LogSignals<'a> {
-    pub(super) fn new(dataset: &'a Dataset, stage: &'a Stage, log: usize) -> Self {
+    pub(super) fn new(
+        dataset: &'a Dataset,
+        stage: &'a Stage,
+        log: usize,
+        columns: &[Column],
+    ) -> Self {
         let source = &dataset.logs[log];
         let (start, rows) = (source.rows.start, &dataset.rows[source.rows.clone()]);
         let movements = dataset.movements.iter().filter(|m| m.log == log);
@@ -33,6 +42,13 @@ impl<'a> LogSignals<'a> {
             .collect();
         Self {
             channels: channels(rows, stage),
+            steps_m: Channel::SINGLE.map(|channel| {
+                let is_own = |column: &&Column| (column.log, column.channel) == (log, channel);
+                columns
+                    .iter()
+                    .find(is_own)
+                    .map_or(0.0, |column| column.step_m)
+            }),
             usable: vec![true; rows.len()],
             period_s: (dataset.period_s(source.rows.clone())).unwrap_or(stage.servo_period_s),
             dataset,

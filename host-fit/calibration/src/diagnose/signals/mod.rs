@@ -25,6 +25,7 @@ mod still;
 mod timing;
 
 use channels::LogSignals;
+use hallstage_input::channels::Column;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::Finding;
 use hallstage_input::stage::Stage;
@@ -39,11 +40,12 @@ const BLOCK: usize = 10;
 pub fn signal_findings(
     dataset: &Dataset,
     stage: &Stage,
+    columns: &[Column],
     fitted: (&FieldParameters, f64),
 ) -> (Vec<Finding>, Vec<usize>) {
     let (mut findings, mut bad) = (Vec::new(), Vec::new());
     for log in 0..dataset.logs.len() {
-        let mut signals = LogSignals::new(dataset, stage, log);
+        let mut signals = LogSignals::new(dataset, stage, log, columns);
         findings.extend(log_findings(&mut signals, fitted));
         let unused = (0..signals.rows.len()).filter(|&row| !signals.usable[row]);
         bad.extend(unused.map(|row| signals.source.rows.start + row));

@@ -4,6 +4,7 @@ use super::signal_findings;
 use crate::diagnose::Described;
 use crate::fit::{FitSettings, ModelChoice, fit};
 use hallstage_input::channel::Channel;
+use hallstage_input::channels::columns;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Severity};
 use hallstage_input::shipped::stage;
@@ -76,7 +77,13 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
 pub(super) fn found(dataset: &Dataset) -> Vec<Finding> {
     let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
     let by = Described::from_fit(fitted.as_ref(), &stage());
-    signal_findings(dataset, &stage(), (&by.parameters, by.lag_s)).0
+    signal_findings(
+        dataset,
+        &stage(),
+        &columns(dataset, &stage()),
+        (&by.parameters, by.lag_s),
+    )
+    .0
 }
 
 /// The warnings about a log.

@@ -39,9 +39,6 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
 
 /// Channels that repeat a value for longer than noise does.
 pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
-    let (hall_m, gap_m) = (log.stage.hall.m_per_count, log.stage.capacitive.m_per_count);
-    // A code of a beam is a nanometre.
-    let codes_m = [hall_m, 1e-9, gap_m];
     let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
         // The mean square: the median is zero for a channel that is refreshed every tenth row.
         let threes = log
@@ -51,7 +48,7 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
         let second = threes.map(|v| (v[0] - 2.0 * v[1]) + v[2]);
         let squares: f64 = second.map(|x| x * x).sum();
         let white_m = (squares / (6.0 * values.len() as f64)).sqrt();
-        let code_m = codes_m[channel / 3];
+        let code_m = log.steps_m[channel];
         // The chance of the most likely code, and the length of a run that is as rare as a clear deviation.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
         let least = match spread(values) {
