@@ -204,6 +204,13 @@ def test_a_log_is_a_table(run30: hs.Log) -> None:
     assert "mount_c" not in df and df["t_us"].iloc[1] - df["t_us"].iloc[0] == 2000
 
 
+def test_the_channels_of_a_log_have_their_noise(run30: hs.Log) -> None:
+    channels = {row["channel"]: row for row in run30.channels}
+    assert list(channels) == ["hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3"]
+    assert 0.4 < channels["hall_b"]["noise_um"] < 0.6 and 0.005 < channels["ifm_x"]["noise_um"] < 0.007
+    assert channels["hall_a"]["stuck_bits"] == [] and channels["ifm_x"]["rows_per_value"] is None
+
+
 def test_a_log_without_reference_is_decoded_and_not_fitted(run30: hs.Log, cal: hs.Calibration) -> None:
     columns = columns_of(run30)
     alone = hs.Log.from_arrays(run30.stage, **{k: columns[k] for k in ["t_us", "movement", "hall", "caps"]})

@@ -117,7 +117,7 @@ impl ColumnFaults {
                 let noise = [0, 1, 2].map(|axis| predicted.noise(axis).powi(2));
                 let change = |axis: usize| {
                     let change = added[axis] + self.floor[axis] - noise[axis] - self.beyond[axis];
-                    change.max(self.floor[axis] - predicted.rms[axis].powi(2))
+                    change.max(added[axis] + self.floor[axis] - predicted.rms[axis].powi(2))
                 };
                 predicted.with_added([0, 1, 2].map(change)).over(self.floor)
             }
@@ -219,7 +219,7 @@ fn faults(
         is_coarse.then_some((steps, of_steps)),
         is_stuck.then_some((stuck, Effect::Variance(stuck_m2))),
         column.slow.map(|rate| (slow(rate), of_rate(rate))),
-        is_filtered.then_some((Kind::LowPass {}, Effect::Unknown)),
+        (is_filtered && column.slow.is_none()).then_some((Kind::LowPass {}, Effect::Unknown)),
         column.to_siblings.filter(is_noisy).map(noisy),
         filled.map(|rows| (Kind::Filled { rows }, Effect::Unknown)),
     ];
