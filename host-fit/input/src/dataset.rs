@@ -1,6 +1,6 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
-use super::stage::TemperatureTable;
+use super::stage::{Interferometer, TemperatureTable};
 use crate::statistics::median;
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
@@ -93,11 +93,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// The displacements of the beams X, Y1, Y2 by the reference, m.
-    pub fn beams_m(&self, y_baseline_m: f64) -> [f64; 3] {
-        let [x, y, rz] = self.reference;
-        let turned_m = 0.5 * y_baseline_m * rz.tan();
-        [x, y + turned_m, y - turned_m]
+    /// The readings of the beams X, Y1, Y2 by the reference, m.
+    pub fn beams_m(&self, interferometer: &Interferometer) -> [f64; 3] {
+        interferometer.beams_m(self.reference, self.vertical)
     }
 }
 

@@ -233,7 +233,7 @@ impl Lines {
                         "correct it for another converter",
                     );
                 }
-                _ if line.is_empty() || line.starts_with('[') || table == "motion" => {
+                _ if line.is_empty() || line.starts_with(['[', '#']) || table == "motion" => {
                     let _ = writeln!(self.text, "{line}");
                 }
                 _ => {

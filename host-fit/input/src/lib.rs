@@ -25,6 +25,7 @@ pub mod finding;
 pub mod log;
 pub mod log_format;
 mod resets;
+pub mod rotation;
 mod sample;
 pub mod shipped;
 pub mod source;

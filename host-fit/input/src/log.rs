@@ -216,7 +216,7 @@ fn read_texts<'t>(
         return Err(Place::new("", None).refuse(LogProblem::NoLog));
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());
-    let resets = reading.dataset.split_at_resets(stage.y_baseline_m);
+    let resets = reading.dataset.split_at_resets(&stage.interferometer);
     if let Some(&first) = resets.first() {
         let kind = Kind::Resets {
             resets: resets.len(),

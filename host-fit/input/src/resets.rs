@@ -3,6 +3,7 @@
 //! A movement ends there, so that each part has its own zero deviation.
 
 use super::dataset::{Dataset, Movement, Row};
+use super::stage::Interferometer;
 
 /// Rows on either side of a jump.
 const ROWS: usize = 6;
@@ -23,7 +24,7 @@ const GAP_PERIODS: f64 = 1.5;
 
 impl Dataset {
     /// Ends movements where beams jump and the probes do not, and returns the first rows of the new movements.
-    pub fn split_at_resets(&mut self, y_baseline_m: f64) -> Vec<usize> {
+    pub fn split_at_resets(&mut self, interferometer: &Interferometer) -> Vec<usize> {
         let mut resets = Vec::new();
         for (log, source) in self
             .logs
@@ -34,7 +35,7 @@ impl Dataset {
             let period_s = self.period_s(source.rows.clone()).unwrap_or(f64::INFINITY);
             for movement in self.movements.iter().filter(|movement| movement.log == log) {
                 let rows = &self.rows[movement.rows.clone()];
-                let found = in_movement(rows, y_baseline_m, 1e6 * GAP_PERIODS * period_s);
+                let found = in_movement(rows, interferometer, 1e6 * GAP_PERIODS * period_s);
                 resets.extend(found.into_iter().map(|row| movement.rows.start + row));
             }
         }
@@ -55,12 +56,8 @@ impl Dataset {
 }
 
 /// The first rows after jumps.
-fn in_movement(rows: &[Row], y_baseline_m: f64, gap_us: f64) -> Vec<usize> {
-    let beams = |row: &Row| {
-        let [x, y, rz] = row.reference;
-        let turned_m = 0.5 * y_baseline_m * rz;
-        [x, y + turned_m, y - turned_m]
-    };
+fn in_movement(rows: &[Row], interferometer: &Interferometer, gap_us: f64) -> Vec<usize> {
+    let beams = |row: &Row| row.beams_m(interferometer);
     // The largest jump of a beam at a row, where it is no motion and stays.
     let jump = |here: usize| -> Option<f64> {
         let window = rows.get(here.checked_sub(ROWS)?..here + ROWS)?;
@@ -121,13 +118,13 @@ mod tests {
 
     #[test]
     fn a_movement_ends_where_beams_jump_and_the_probes_do_not() {
-        let baseline_m = stage().y_baseline_m;
+        let interferometer = &stage().interferometer;
         let mut log = run();
-        assert!(log.split_at_resets(baseline_m).is_empty());
+        assert!(log.split_at_resets(interferometer).is_empty());
         let (end, count) = (log.rows.len(), log.movements.len());
         add(&mut log, 4321, end, [2.0, -1.5, 10.0]);
         add(&mut log, 9876, end, [-40.0, 0.0, 0.0]);
-        assert_eq!(log.split_at_resets(baseline_m), [4321, 9876]);
+        assert_eq!(log.split_at_resets(interferometer), [4321, 9876]);
         assert_eq!(log.movements.len(), count + 2);
         for (number, movement) in log.movements.iter().enumerate() {
             let rows = &log.rows[movement.rows.clone()];
@@ -137,10 +134,10 @@ mod tests {
 
     #[test]
     fn spikes_and_motion_end_no_movement() {
-        let baseline_m = stage().y_baseline_m;
+        let interferometer = &stage().interferometer;
         let mut spike = run();
         add(&mut spike, 4321, 4322, [20.0, -15.0, 10.0]);
-        assert!(spike.split_at_resets(baseline_m).is_empty());
+        assert!(spike.split_at_resets(interferometer).is_empty());
         let mut motion = run();
         let end = motion.rows.len();
         add(&mut motion, 4321, end, [20.0, -15.0, 0.0]);
@@ -148,6 +145,6 @@ mod tests {
             let [a, b, c] = &mut row.signal_m;
             (*a, *b, *c) = (*a - 15e-6, *b - 15e-6, *c + 20e-6);
         }
-        assert!(motion.split_at_resets(baseline_m).is_empty());
+        assert!(motion.split_at_resets(interferometer).is_empty());
     }
 }

@@ -1,14 +1,18 @@
 //! The stage as designed: geometry, scales, and search ranges.
 
+mod air;
+mod beams;
 mod columns;
 mod document;
 mod error;
 mod file;
+mod interferometer;
 mod motion;
 mod search;
 mod temperature;
 
 pub use error::{StageError, TextPosition};
+pub use interferometer::Interferometer;
 pub use motion::{AxisMotion, Motion};
 pub use temperature::TemperatureTable;
 
@@ -136,8 +140,8 @@ pub struct Stage {
     pub capacitive_probes_m: ProbePositions<f64>,
     /// Scale of the capacitive codes.
     pub capacitive: CodeScale,
-    /// Distance between the two Y beams of the interferometer, m.
-    pub y_baseline_m: f64,
+    /// The interferometers.
+    pub interferometer: Interferometer,
     /// Error of a reset of the interferometers in X, Y, Rz, standard deviation, m, m, rad; `None` where nothing
     /// is known of it, or where the Hall probes say where the stage is reset.
     pub reset_sd: Option<[f64; 3]>,

@@ -98,7 +98,7 @@ impl Stage {
     /// Distance between the two Y beams of the interferometer, m.
     #[getter]
     fn y_baseline_m(&self) -> f64 {
-        self.designed.y_baseline_m
+        self.designed.interferometer.y_baseline_m
     }
 
     fn __repr__(&self) -> &str {

@@ -23,9 +23,9 @@
 //! in service.
 
 use super::magnet::Cuboid;
-use super::pose::rotation;
 use super::probe::{HallProbe, MAGNET_HALF_M, TILT_LEVER_M, TrimmedProbe, designed_magnet, gap_m};
 use super::random::{Purpose, Stream};
+use hallstage_input::rotation::rotation;
 use hallstage_input::stage::{Range, Stage, paper_signs};
 use nalgebra::Vector3;
 use std::f64::consts::PI;

@@ -172,11 +172,14 @@ fn record_with(
                 }
             }
             let error = reference.next(&mut random);
-            let planar = core::array::from_fn(|i| pose.planar[i] + error[i]);
+            let shown = StagePose {
+                planar: core::array::from_fn(|i| pose.planar[i] + error[i]),
+                ..*pose
+            };
             let mut noisy = |value: f64, deviation: f64| value + random.normal(deviation);
             samples.push(Sample {
                 t_us,
-                beams_nm: beams_m(stage, planar)
+                beams_nm: beams_m(stage, &shown)
                     .map(|beam| (noisy(beam, errors.beam_m) * 1e9).round() as i64),
                 capacitive: gaps_m(stage, pose)
                     .map(|gap| code(noisy(gap, errors.gap_m), &stage.capacitive)),
@@ -242,18 +245,15 @@ impl Recording {
 
 fn row(stage: &Stage, per_gap: &Matrix3<f64>, movement: usize, sequence: u32, s: &Sample) -> Row {
     let gaps = (s.capacitive).map(|code| f64::from(code) * stage.capacitive.m_per_count);
-    let [x, y1, y2] = s.beams_nm.map(|nm| nm as f64 * 1e-9);
+    let vertical = (per_gap * Vector3::from(gaps)).into();
+    let beams_m = s.beams_nm.map(|nm| nm as f64 * 1e-9);
     Row {
         movement,
         t_us: s.t_us,
         frame: s.codes(sequence).into(),
         signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
-        vertical: (per_gap * Vector3::from(gaps)).into(),
-        reference: [
-            x,
-            (y1 + y2) / 2.0,
-            libm::atan((y1 - y2) / stage.y_baseline_m),
-        ],
+        vertical,
+        reference: stage.interferometer.pose(beams_m, vertical),
     }
 }
 

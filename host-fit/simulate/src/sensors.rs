@@ -69,11 +69,16 @@ pub fn gaps_m(stage: &Stage, pose: &StagePose) -> [f64; 3] {
         .map(|[x, y]| at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z)
 }
 
-/// The displacements along the beams X, Y1, Y2 for X, Y, Rz, m. The Y beams meet the stage at plus and
-/// minus half their distance.
-pub fn beams_m(stage: &Stage, [x, y, rz]: [f64; 3]) -> [f64; 3] {
-    let half = 0.5 * stage.y_baseline_m * libm::sin(rz);
-    [x, y + half, y - half]
+/// The readings of the beams X, Y1, Y2 at a pose, m. Without places of the beams, the Y beams follow two points of the stage,
+/// at plus and minus half their distance.
+pub fn beams_m(stage: &Stage, pose: &StagePose) -> [f64; 3] {
+    let interferometer = &stage.interferometer;
+    if interferometer.has_places() {
+        return interferometer.beams_m(pose.planar, pose.vertical);
+    }
+    let [x, y, rz] = pose.planar;
+    let half = 0.5 * interferometer.y_baseline_m * libm::sin(rz);
+    interferometer.readings_m([x, y + half, y - half])
 }
 
 /// The error of the interferometers: a random walk that starts at the error of the reset.

@@ -9,6 +9,7 @@ use super::provenance::Provenance;
 use super::result::Report;
 use super::table::Table;
 use super::text::file_name;
+use super::trusted::reference;
 use super::verdict::{Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::white_noise;
@@ -123,10 +124,7 @@ impl Source<'_> {
         if let Some(motion) = motion.filter(|_| self.subject.is_field) {
             add("motion", words::up_to(motion));
         }
-        add(
-            "reference",
-            "laser interferometers X, Y1, Y2, as logged".to_owned(),
-        );
+        add("reference", reference(self.stage));
         let (rows, movements) = self.dataset.read();
         let logs = self.dataset.logs.iter().map(|log| file_name(&log.path));
         let logs: Vec<String> = logs.collect();

@@ -6,7 +6,7 @@ use super::field;
 use super::figure::{Figure, Group, Item, bare, figure, group};
 use super::motion::{probe_motion, valid_up_to};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
-use super::trusted::trusted;
+use super::trusted::{reference, trusted};
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{Fit, FitSettings};
@@ -98,7 +98,8 @@ impl Report {
     /// | `valid_up_to` | the rms acceleration and speed of all axes at once up to which they are good |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `channels` | properties of each column of the logs |
-    /// | `trusted_inputs` | the inputs with errors that no log shows, and the cost of 1 % |
+    /// | `reference` | the point whose pose is calibrated, and the places of the beams |
+    /// | `trusted_inputs` | the inputs with errors that no log shows, an error of each, and its cost |
     pub fn from_judgement(judged: Judged) -> Self {
         let Judged {
             set,
@@ -140,7 +141,8 @@ impl Report {
             "findings" => json!(words::worded(findings)),
             "channels" => channels(&diagnosis.columns, dataset),
             "logs" => several(errors_per_log(dataset, judgement)),
-            "trusted_inputs" => trusted(set),
+            "reference" => reference(judged.stage),
+            "trusted_inputs" => trusted(set, judged.stage),
             "refusal" => json!(refusal),
             // Programs may look these up in any report.
             "model_reason" => Figure::None,

@@ -54,8 +54,7 @@ const SIDES: [[Code; 2]; 3] = [
 
 /// All mistakes with order, sign, scale and place; mistakes with gaps only if the log has codes.
 pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
-    let half_m = 0.5 * stage.y_baseline_m;
-    let beams = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, half_m, 0.0, 1.0, -half_m);
+    let beams = stage.interferometer.beams_per_pose();
     let gaps = pose_to_gaps(&stage.capacitive_probes_m);
     let sides = [Matrix3::identity(), beams, gaps].into_iter().enumerate();
     let mut out = Vec::new();

@@ -16,12 +16,11 @@ pub(super) struct Slopes {
 
 impl Slopes {
     pub(super) fn new(stage: &Stage, probes: [Probe; 3]) -> Self {
-        let turn = 1.0 / stage.y_baseline_m;
         // The sensors of a checked stage do not stand on one line.
         let per_gap = vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default();
         Self {
             probes,
-            by_beam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, turn, -turn),
+            by_beam: stage.interferometer.pose_per_beam(),
             by_gap: per_gap * 1e-3,
         }
     }

@@ -66,7 +66,7 @@ fn again(
             break;
         }
         total_s += lag.value_s;
-        let later = with_reference_later(dataset, total_s);
+        let later = with_beams_later(dataset, stage, [total_s; 3]);
         found = fit_once(&later, stage, settings)?;
         found.later = Some(later);
     }
@@ -76,15 +76,9 @@ fn again(
     Ok(found)
 }
 
-/// The rows with the reference of `later_s` after them: see [`with_beams_later`].
-fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
-    with_beams_later(dataset, [later_s; 3], 1.0)
-}
-
-/// The rows with the beams X, Y1, Y2 (the latter two 2 `half_m` apart) of `later_s` after them, interpolated
-/// between their neighbours (cubic); rows that lack neighbours, at the ends of a movement and beside gaps, are
-/// left out.
-pub(crate) fn with_beams_later(dataset: &Dataset, later_s: [f64; 3], half_m: f64) -> Dataset {
+/// The rows with the beams X, Y1, Y2 of `later_s` after them, interpolated between their neighbours (cubic);
+/// rows that lack neighbours, at the ends of a movement and beside gaps, are left out.
+pub(crate) fn with_beams_later(dataset: &Dataset, stage: &Stage, later_s: [f64; 3]) -> Dataset {
     let mut out = Dataset {
         rows: Vec::with_capacity(dataset.rows.len()),
         movements: Vec::new(),
@@ -95,17 +89,24 @@ pub(crate) fn with_beams_later(dataset: &Dataset, later_s: [f64; 3], half_m: f64
     for movement in &dataset.movements {
         let rows = &dataset.rows[movement.rows.clone()];
         let (start, number) = (out.rows.len(), out.movements.len());
+        let interferometer = &stage.interferometer;
+        let beams_m = |row: &Row| row.beams_m(interferometer);
+        let beams_m: Vec<[f64; 3]> = rows.iter().map(beams_m).collect();
         for row in rows {
-            let later = |later_s: f64| {
-                let t_us = row.t_us as f64 + later_s * 1e6;
+            let later = |beam: usize| {
+                let t_us = row.t_us as f64 + later_s[beam] * 1e6;
                 let next = rows.partition_point(|row| row.t_us as f64 <= t_us);
-                between(rows.get(next.checked_sub(2)?..next + 2)?, t_us)
+                let four = next.checked_sub(2)?..next + 2;
+                let of_beam = beams_m
+                    .get(four.clone())?
+                    .iter()
+                    .map(|beams_m| beams_m[beam]);
+                between(&rows[four], of_beam, t_us)
             };
-            if let [Some([x, ..]), Some([_, y1, rz1]), Some([_, y2, rz2])] = later_s.map(later) {
-                let (y1, y2) = (y1 + half_m * rz1, y2 - half_m * rz2);
+            if let [Some(x), Some(y1), Some(y2)] = [0, 1, 2].map(later) {
                 out.rows.push(Row {
                     movement: number,
-                    reference: [x, 0.5 * (y1 + y2), 0.5 * (y1 - y2) / half_m],
+                    reference: interferometer.pose([x, y1, y2], row.vertical),
                     ..*row
                 });
             }
@@ -127,23 +128,21 @@ pub(crate) fn with_beams_later(dataset: &Dataset, later_s: [f64; 3], half_m: f64
     out
 }
 
-/// The reference at a time within four rows, by the cubic through them; `None` across a gap.
-fn between(four: &[Row], t_us: f64) -> Option<[f64; 3]> {
+/// The value at a time within four rows, by the cubic through their values; `None` across a gap.
+fn between(four: &[Row], values: impl Iterator<Item = f64>, t_us: f64) -> Option<f64> {
     let steps = || four.windows(2).map(|pair| pair[1].t_us - pair[0].t_us);
     if steps().max() > steps().min().map(|shortest| STEP_MAX * shortest) {
         return None;
     }
-    let mut sum = [0.0; 3];
-    for (i, row) in four.iter().enumerate() {
+    let mut sum = 0.0;
+    for (i, (row, value)) in four.iter().zip(values).enumerate() {
         let mut weight = 1.0;
         for (k, other) in four.iter().enumerate() {
             if k != i {
                 weight *= (t_us - other.t_us as f64) / (row.t_us - other.t_us) as f64;
             }
         }
-        for (sum, x) in sum.iter_mut().zip(row.reference) {
-            *sum += weight * x;
-        }
+        sum += weight * value;
     }
     Some(sum)
 }
@@ -152,11 +151,12 @@ fn between(four: &[Row], t_us: f64) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
     use hallstage_input::dataset::LoggedFrame;
+    use hallstage_input::shipped::stage;
     use runtime::RawFrame;
 
     /// A pose of third order in time, s.
     fn pose(t_s: f64) -> [f64; 3] {
-        [1.0, -0.3, 2.0].map(|a| a * (t_s * (1.0 + t_s * (0.5 - 7.0 * t_s))))
+        [1e-3, -3e-4, 2e-3].map(|a| a * (t_s * (1.0 + t_s * (0.5 - 7.0 * t_s))))
     }
 
     /// Two movements of ten rows; the second lacks its sixth and seventh. The reference shows
@@ -189,10 +189,10 @@ mod tests {
     #[test]
     fn the_reference_is_read_later_by_the_lag_and_never_across_a_gap() {
         for (lag_s, left) in [(1.3e-3, 7), (4.6e-3, 6), (-2.7e-3, 7)] {
-            let after = with_reference_later(&dataset(lag_s), lag_s);
+            let after = with_beams_later(&dataset(lag_s), &stage(), [lag_s; 3]);
             for row in &after.rows {
                 for (found, wanted) in row.reference.iter().zip(row.signal_m) {
-                    assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+                    assert!((found - wanted).abs() < 1e-15, "{found} {wanted}");
                 }
             }
             let rows: Vec<_> = after.movements.iter().map(|m| m.rows.clone()).collect();

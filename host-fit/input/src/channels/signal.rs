@@ -52,7 +52,7 @@ pub(super) fn signals<'a>(
     let value = |row: &Row, k: usize| match k {
         0..3 => f64::from(row.frame.hall()[k]),
         // Whole picometres: rounding on the way to a pose and back is far less.
-        3..6 => (1e12 * row.beams_m(stage.y_baseline_m)[k - 3]).round(),
+        3..6 => (1e12 * row.beams_m(&stage.interferometer)[k - 3]).round(),
         _ => row
             .frame
             .capacitive()

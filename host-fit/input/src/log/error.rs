@@ -136,6 +136,12 @@ pub enum LogProblem {
         /// The key in the `[log]` table.
         key: &'static str,
     },
+    /// The places of the beams are known, and the log holds no beams.
+    #[error(
+        "the log holds X, Y, Rz in place of the beams, so places, scales and air of the beams do not apply; log the \
+         beams, or take `x`, `y1`, `y2`, `scale` and `air` out of [interferometer] in stage.toml"
+    )]
+    PoseWithPlaces,
     /// A column is not known.
     #[error(
         "it is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml, which `host-fit init` drafts (known columns: {known})"

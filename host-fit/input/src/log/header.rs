@@ -73,6 +73,10 @@ pub(super) fn columns(
     let is_there = sets.iter().flatten().any(|q| header.find(*q).is_some());
     let is_needed = is_there || reference == ReferenceUse::Required;
     let reference = is_needed.then(|| header.one_of(sets)).transpose()?;
+    let is_pose = reference.is_some_and(|(set, _)| set == Quantity::PLANAR);
+    if is_pose && stage.interferometer.corrects() {
+        return Err(header.refused(LogProblem::PoseWithPlaces));
+    }
     Ok(Columns {
         movement,
         time,

@@ -6,7 +6,7 @@ use super::layout::Quantity;
 use super::record::Record;
 use super::time::Clock;
 use crate::dataset::{LoggedFrame, Row};
-use crate::stage::{CodeScale, Stage};
+use crate::stage::{CodeScale, Interferometer, Stage};
 use nalgebra::{Matrix3, Vector3};
 use runtime::capacitive::vertical_per_gap;
 use runtime::frame::MISSING_CODE;
@@ -32,7 +32,7 @@ pub(super) struct RowReader<'a> {
     hall: &'a CodeScale,
     capacitive: &'a CodeScale,
     vertical_per_gap: Matrix3<f64>,
-    y_baseline_m: f64,
+    interferometer: &'a Interferometer,
     displacement_max_m: f64,
     height_max_m: f64,
     /// m degC at zero of the columns.
@@ -61,7 +61,7 @@ impl<'a> RowReader<'a> {
             capacitive: &stage.capacitive,
             // A checked stage has its sensors in a triangle.
             vertical_per_gap: vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default(),
-            y_baseline_m: stage.y_baseline_m,
+            interferometer: &stage.interferometer,
             displacement_max_m: displacement_max_m(stage),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
             zero_mc: stage.temperature.scale_mc[1],
@@ -129,7 +129,7 @@ impl<'a> RowReader<'a> {
             frame,
             signal_m: hall.map(|code| f64::from(code) * self.hall.m_per_count),
             vertical,
-            reference: self.reference(row)?,
+            reference: self.reference(row, vertical)?,
         })
     }
 
@@ -170,7 +170,7 @@ impl<'a> RowReader<'a> {
     }
 
     /// X, Y, Rz: m, m, rad.
-    fn reference(&self, row: &Record) -> Result<[f64; 3], BadCell> {
+    fn reference(&self, row: &Record, vertical: [f64; 3]) -> Result<[f64; 3], BadCell> {
         let length = |source| scaled(row, source, self.displacement_max_m, "m");
         let Some((set, [x, y, z])) = self.columns.reference else {
             return Ok([0.0; 3]);
@@ -179,10 +179,7 @@ impl<'a> RowReader<'a> {
         if set != Quantity::BEAMS {
             return Ok([x, y, scaled(row, z, ROTATION_MAX_RAD, "rad")?]);
         }
-        let (y1, y2) = (y, length(z)?);
-        // libm, not the platform's: the same bits everywhere.
-        let rz = libm::atan((y1 - y2) / self.y_baseline_m);
-        Ok([x, (y1 + y2) / 2.0, rz])
+        Ok(self.interferometer.pose([x, y, length(z)?], vertical))
     }
 }
 

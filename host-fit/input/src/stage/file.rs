@@ -5,7 +5,7 @@
 
 use super::document::{Document, Value};
 use super::error::StageError;
-use super::{CodeScale, Probe, Stage, columns, motion, paper_signs, search, temperature};
+use super::{CodeScale, Probe, Stage, beams, columns, motion, paper_signs, search, temperature};
 use crate::source;
 use nalgebra::Matrix3;
 use runtime::capacitive::{ProbePositions, vertical_per_gap};
@@ -22,8 +22,6 @@ pub(super) const COORDINATE_MAX_M: f64 = 10.0;
 const COORDINATES_M: (f64, f64) = (-COORDINATE_MAX_M, COORDINATE_MAX_M);
 /// Full scales of a converter that make sense, m.
 const FULL_SCALES_M: (f64, f64) = (1e-6, 0.1);
-/// Distances between the two Y beams that make sense, m.
-const BASELINES_M: (f64, f64) = (1e-3, COORDINATE_MAX_M);
 /// Errors of a reset that make sense, m or rad.
 const RESETS: (f64, f64) = (1e-9, 1e-3);
 /// Servo periods that make sense, s.
@@ -65,7 +63,7 @@ impl Stage {
             hall: code_scale(document, "hall")?,
             capacitive_probes_m: capacitive_probes(document, &capacitive)?,
             capacitive,
-            y_baseline_m: document.required("interferometer", "y_baseline_m", BASELINES_M, "m")?,
+            interferometer: beams::interferometer(document)?,
             reset_sd: reset_sd(document)?,
             servo_period_s: document.required("servo", "period_s", PERIODS_S, "s")?,
             search: search::ranges(document, &probes)?,

@@ -69,7 +69,7 @@ fn a_sound_file_gives_the_stage_in_si_units() {
         (-32767, 32766)
     );
     assert_eq!(stage.capacitive_probes_m[2], [0.0, -0.12]);
-    assert_eq!(stage.y_baseline_m, 0.1);
+    assert_eq!(stage.interferometer.y_baseline_m, 0.1);
     let theta = 8f64.to_radians();
     let range = |low, high| Range { low, high };
     let term = |key| stage.search.get(key).expect(key);
@@ -201,6 +201,12 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         ("= 1.5625e-8", "= 1.5e-18", 15, 15, "capacitive.m_per_count", "a full scale"),
         ("= 0.10", "= 0", 20, 16, "interferometer.y_baseline_m", "0 m is outside"),
         ("= 0.10", "= 0.10\nreset_sd = { x_m = 2e-6, y_m = 2.0, rz_rad = 1e-6 }", 21, 32, "interferometer.reset_sd.y_m", "2 m is outside"),
+        ("= 0.10", "= 0.10\ny1 = { x_m = 50 }", 21, 14, "interferometer.y1.x_m", "50 m is outside"),
+        ("= 0.10", "= 0.10\nx = { y_m = 0.0, towards_x_rad = 0.0 }", 21, 18, "interferometer.x.towards_x_rad", "did you mean `towards_y_rad`?"),
+        ("= 0.10", "= 0.10\ny1 = { x_m = 0.06 }\ny2 = { x_m = -0.06 }", 22, 14, "interferometer.y2.x_m", "y1.x_m - y2.x_m is 0.12 m"),
+        ("= 0.10", "= 0.10\ny1 = { towards_x_rad = 0.1 }\nx = { y_m = -1.5 }", 20, 16, "interferometer.y_baseline_m", "do not follow from such beams"),
+        ("= 0.10", "= 0.10\nscale = [1, 1, 0]", 21, 16, "interferometer.scale[2]", "0 m per m is outside"),
+        ("= 0.10", "= 0.10\nair = { index = 1 }", 21, 7, "interferometer.air.temperature_c", "missing"),
         ("= 0.002", "= 0.0", 23, 12, "servo.period_s", "0 s is outside"),
         ("= 0.002", "= -0.002", 23, 12, "servo.period_s", "is outside"),
         ("= 0.002", "= 2e-9", 23, 12, "servo.period_s", "is outside"),

@@ -18,6 +18,7 @@ use hallstage_solver::estimator::clocks::{Alignment, Lag};
 use nalgebra::Matrix3;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::ReferencedTick;
+use runtime::capacitive::vertical_per_gap;
 
 /// The estimated offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +78,8 @@ pub(super) struct Records<'r> {
     is_beams: bool,
     /// Readings of the designed probes per X, Y, Rz.
     plane: Matrix3<f64>,
+    /// Z, Rx, Ry per gap.
+    per_gap: Matrix3<f64>,
 }
 
 /// Most ticks of the correlation, and of a fit.
@@ -126,6 +129,8 @@ impl<'r> Records<'r> {
             scale: reference.quantities.map(|q| stage.log.column(q).scale),
             stage,
             is_beams: reference.quantities == Quantity::BEAMS,
+            // A checked stage has its sensors in a triangle.
+            per_gap: vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default(),
             plane: stage.geometry().plane(),
         }
     }

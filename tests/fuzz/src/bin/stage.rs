@@ -9,7 +9,7 @@ use std::path::Path;
 fuzz_target!(|text: &str| {
     match Stage::from_toml(text, Path::new("stage.toml")) {
         Ok(stage) => {
-            assert!(stage.servo_period_s > 0.0 && stage.y_baseline_m > 0.0);
+            assert!(stage.servo_period_s > 0.0 && stage.interferometer.y_baseline_m > 0.0);
             for scale in [stage.hall, stage.capacitive] {
                 assert!(scale.m_per_count > 0.0 && scale.window.is_sound());
             }

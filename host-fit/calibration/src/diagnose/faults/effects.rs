@@ -140,14 +140,14 @@ impl Sensed {
         probes: &[Probe; 3],
         lag_s: f64,
     ) -> Vec<[f64; 9]> {
-        let half_m = 0.5 * stage.y_baseline_m;
         let values = |row: &FieldRow| {
             let planar_mm = row.planar_mm(lag_s, [0.0; 3]);
             let [a, b, c] = probes.map(|probe| probe.signal_mm(planar_mm, row.vertical));
-            let [x, y, rz] = row.reference_mm;
+            let reference = row.reference_mm.map(|q| 1e-3 * q);
+            let beams_m = stage.interferometer.beams_m(reference, row.vertical);
+            let [x, y1, y2] = beams_m.map(|m| 1e3 * m);
             let vertical = VerticalPose::from_array(row.vertical);
             let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
-            let [y1, y2] = [y + half_m * rz, y - half_m * rz];
             [a, b, c, x, y1, y2, one, two, three]
         };
         rows.iter().map(values).collect()

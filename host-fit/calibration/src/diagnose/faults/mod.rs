@@ -119,7 +119,7 @@ pub fn find_faults(
             break first;
         }
         // A lag is not linear.
-        let later = with_beams_later(dataset, finder.lags_s, 0.5 * stage.y_baseline_m);
+        let later = with_beams_later(dataset, stage, finder.lags_s);
         start = first.parameters;
         finder.means = Means::new(&later, stage, &start, calibrated.shows_acceleration);
         finder.dataset = Cow::Owned(later);

@@ -83,7 +83,9 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
     let mut channels = vec![Vec::new(); 9];
     for row in rows {
         // Equal beams differ by rounding after the way to a pose and back.
-        let beams_m = (row.beams_m(stage.y_baseline_m)).map(|beam_m| f64::from(beam_m as f32));
+        let beams_m = row
+            .beams_m(&stage.interferometer)
+            .map(|beam_m| f64::from(beam_m as f32));
         let codes = row.frame.capacitive().into_iter().flatten();
         let gaps_m = codes.map(|code| f64::from(code) * stage.capacitive.m_per_count);
         let values = row.signal_m.into_iter().chain(beams_m).chain(gaps_m);

@@ -106,3 +106,23 @@ fn tables_that_are_no_log() {
         assert!(error.contains(part), "{part}: {error}");
     }
 }
+
+#[test]
+fn a_pose_in_place_of_the_beams_is_refused_beside_their_places() {
+    let pose = replaced(
+        LOG,
+        &[("ifm_x_nm,ifm_y1_nm,ifm_y2_nm", "x_nm,y_nm,rz_nrad")],
+    );
+    for line in ["x = { z_m = 0.01 }", "scale = [1.0, 1.0, 1.001]"] {
+        let baseline = "y_baseline_m = 0.10";
+        let text = SOUND.replace(baseline, &format!("{baseline}\n{line}"));
+        let stage = Stage::from_toml(&text, Path::new("stage.toml")).expect("sound");
+        assert!(read_in(LOG, &stage).is_ok());
+        refused_with(
+            &pose,
+            &stage,
+            &["1: the log holds X, Y, Rz", "[interferometer]"],
+        );
+    }
+    assert!(read_in(&pose, stage()).is_ok());
+}

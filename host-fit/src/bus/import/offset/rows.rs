@@ -6,7 +6,6 @@ use crate::bus::import::join::{ReferenceAt, at};
 use crate::bus::import::node_clock::Tick;
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::Vector3;
-use runtime::capacitive::vertical_per_gap;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug)]
@@ -21,9 +20,6 @@ impl Records<'_> {
     /// The rows of the fit, with the speed of the reference.
     pub(super) fn field_rows(&self, rows: &[ReferencedTick], clocks: &Clocks) -> Rows {
         let hall_mm = self.stage.hall.m_per_count * 1e3;
-        let gap_m = self.stage.capacitive.m_per_count;
-        // A checked stage has its sensors in a triangle.
-        let per_gap = vertical_per_gap(&self.stage.capacitive_probes_m).unwrap_or_default();
         let mut used = Vec::with_capacity(rows.len());
         let mut movements = Vec::new();
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
@@ -31,16 +27,15 @@ impl Records<'_> {
             used.extend(movement.iter().filter_map(|row| {
                 let t_us = clocks.on_reference_us(row.tick.t_us);
                 let half_us = self.period_us / 2.0;
-                let (before, after) = (self.at(t_us - half_us)?, self.at(t_us + half_us)?);
+                let vertical = self.vertical(&row.tick);
+                let at = |t_us| self.at(t_us, vertical);
+                let (before, after) = (at(t_us - half_us)?, at(t_us + half_us)?);
                 let per_second = 1e9 / self.period_us;
                 (before.0 == after.0).then(|| FieldRow {
                     temperature_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
                     signal_mm: row.tick.codes.hall.map(|code| hall_mm * f64::from(code)),
-                    vertical: (per_gap
-                        * Vector3::from(row.tick.codes.capacitive)
-                            .map(|code| gap_m * f64::from(code)))
-                    .into(),
+                    vertical,
                     reference_mm: row.pose.map(|q| q * 1e3),
                     rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
                     vertical_rate: [0.0; 3],
@@ -58,7 +53,8 @@ impl Records<'_> {
     /// The ticks that have a reference.
     pub(super) fn rows(&self, ticks: &[Tick], clocks: &Clocks) -> Vec<ReferencedTick> {
         let row = |tick: &Tick| {
-            let (movement, pose) = self.at(clocks.on_reference_us(tick.t_us))?;
+            let (movement, pose) =
+                self.at(clocks.on_reference_us(tick.t_us), self.vertical(tick))?;
             Some(ReferencedTick {
                 tick: *tick,
                 movement,
@@ -68,21 +64,27 @@ impl Records<'_> {
         ticks.iter().filter_map(row).collect()
     }
 
-    /// Movement and pose at a time of the reference.
-    fn at(&self, t_us: f64) -> Option<(i64, [f64; 3])> {
+    /// Z, Rx, Ry of a tick: m, rad, rad.
+    fn vertical(&self, tick: &Tick) -> [f64; 3] {
+        let gaps = tick
+            .codes
+            .capacitive
+            .map(|code| f64::from(code) * self.stage.capacitive.m_per_count);
+        (self.per_gap * Vector3::from(gaps)).into()
+    }
+
+    /// Movement and pose at a time of the reference, with this vertical pose.
+    fn at(&self, t_us: f64, vertical: [f64; 3]) -> Option<(i64, [f64; 3])> {
         let ReferenceAt::Found {
             movement, values, ..
         } = at(self.samples, t_us, 2.0 * self.period_us)
         else {
             return None;
         };
-        let [x, second, third] = [0, 1, 2].map(|k| values[k] * self.scale[k]);
+        let values = [0, 1, 2].map(|k| values[k] * self.scale[k]);
         let pose = match self.is_beams {
-            true => {
-                let rz = ((second - third) / self.stage.y_baseline_m).atan();
-                [x, 0.5 * (second + third), rz]
-            }
-            false => [x, second, third],
+            true => self.stage.interferometer.pose(values, vertical),
+            false => values,
         };
         Some((movement, pose))
     }
