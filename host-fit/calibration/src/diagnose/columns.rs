@@ -90,6 +90,8 @@ impl ColumnFaults {
             };
             // Harmless properties are in the table of channels only.
             let faults = faults(column, noise_m, log.rows.len()).map(with_cost);
+            // Movements that are too short show no noise to compare with.
+            let faults = faults.filter(|_| noise_m > 0.0);
             let worst = faults.filter(|(found, _)| found.severity > Severity::Note);
             for (found, own) in worst.take(1) {
                 findings.push(found);
@@ -195,7 +197,9 @@ fn faults(
         true => is_quiet && low > FALLS_OF_BEAM[0] && high > FALLS_OF_BEAM[1],
         false => PROBES.contains(&column.channel) && high > FALL_OF_PROBE,
     };
-    let is_noisy = |ratio: &f64| *ratio > NOISY && !is_beam && !column.is_rounded();
+    // At lower rates motion is in the differences.
+    let shows_noise = column.falls.is_some() && !column.is_rounded();
+    let is_noisy = |ratio: &f64| *ratio > NOISY && !is_beam && shows_noise;
     let noisy = |ratio: f64| {
         let noise_um = 1e6 * noise_m;
         (
@@ -260,6 +264,8 @@ mod tests {
     fn a_sound_log_has_no_finding_and_keeps_its_prediction() {
         let none = faults_of(|_, _| ());
         assert_eq!(none.findings, []);
+        let short = faults_of(|k, row| row.movement = k / 5);
+        assert_eq!(short.findings, []);
         let predicted = Predicted {
             rms: [1e-6; 3],
             ratio: [1.02; 3],
