@@ -4,7 +4,7 @@ use super::interrupt;
 use crate::calibrate::Choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::Outputs;
+use crate::output::{OutputError, Outputs, kept};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hallstage_input::log::{self, BadRows, LogReading, ReadOptions};
@@ -92,6 +92,12 @@ pub(super) struct Json {
 }
 
 impl Json {
+    /// Refuses to replace a file that holds no figures.
+    pub(super) fn check_own(&self) -> Result<(), OutputError> {
+        let path = self.path.as_ref();
+        path.map_or(Ok(()), |path| kept::check_own(path, kept::JSON))
+    }
+
     /// Adds the figures to the outputs, if they are asked for.
     pub(super) fn add(
         &self,

@@ -4,9 +4,9 @@ use super::arguments::{StageFile, choice, hold};
 use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::Output;
 use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
+use crate::output::{Output, kept};
 use clap::Args;
 use hallstage_calibration::words;
 use hallstage_input::stage::Stage;
@@ -40,12 +40,18 @@ pub(super) struct DecodeArgs {
     /// How poses are written.
     #[arg(long, value_parser = choice::<PoseFormat>(), default_value = "csv")]
     format: PoseFormat,
+    /// Replace a file that may hold a measurement.
+    #[arg(long)]
+    force: bool,
 }
 
 /// Decodes a log into a pose file.
 pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let inputs = [&args.params, &args.log, &args.stage.path].map(PathBuf::as_path);
     super::check_outputs([Some(args.out.as_path())], None, inputs)?;
+    if !args.force {
+        kept::check_own(&args.out, kept::POSES)?;
+    }
     let (set, stage) = super::blob_of_stage(&args.params, &args.stage)?;
     let known = || posterior(&set, &stage, &args.params);
     let posterior = args.uncertainty.then(known).transpose()?;

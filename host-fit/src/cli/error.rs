@@ -138,7 +138,11 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
         );
     }
     if let Some(OutputError {
-        problem: OutputProblem::IsInput | OutputProblem::IsOutput,
+        problem:
+            OutputProblem::IsInput
+            | OutputProblem::IsOutput
+            | OutputProblem::NotOwn
+            | OutputProblem::OtherSerial(_),
         ..
     }) = error.downcast_ref()
     {

@@ -7,7 +7,7 @@ use super::report::finish;
 use crate::calibrate::FitOrder;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::{Outputs, blob_file, posterior_file};
+use crate::output::{Outputs, blob_file, kept, posterior_file};
 use crate::report::channels::channels;
 use crate::report::parameters;
 use crate::report::table::Table;
@@ -42,6 +42,11 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     super::check_outputs(outputs, Some(&args.report), args.logs.inputs())?;
+    if !args.options.force {
+        let serial = args.options.serial.as_ref();
+        kept::check_own_blob(&args.out, serial.map_or("", |serial| serial.as_str()))?;
+        args.json.check_own()?;
+    }
     let created = args.report.created.clone().unwrap_or_default();
     let order = args.options.order(created, interrupt::watch());
     let job = Job {

@@ -60,7 +60,7 @@ pub struct FitOptions {
     /// written.
     #[arg(long, value_name = "x=1.5um,...")]
     pub limit: Option<ErrorLimits>,
-    /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
+    /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so. Replace any file.
     #[arg(long)]
     pub force: bool,
 }

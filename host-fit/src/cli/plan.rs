@@ -3,7 +3,7 @@
 use super::arguments::{Json, StageFile, between};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::Outputs;
+use crate::output::{Outputs, kept};
 use crate::report::plan::{figures, steps, tables, untold};
 use crate::report::text::as_text;
 use clap::Args;
@@ -33,6 +33,9 @@ pub(super) struct PlanArgs {
     /// for every servo period; `-` for standard output.
     #[arg(long, value_name = "run.csv")]
     out: Option<PathBuf>,
+    /// Replace a file that may hold a measurement.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     json: Json,
 }
@@ -41,6 +44,10 @@ pub(super) struct PlanArgs {
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
     super::check_outputs(outputs, None, [args.stage.path.as_path()])?;
+    if !args.force {
+        (args.out.as_ref()).map_or(Ok(()), |path| kept::check_own(path, kept::PLAN))?;
+        args.json.check_own()?;
+    }
     let stage = args.stage.read()?;
     let (seconds, period_s) = (args.seconds.unwrap_or(COLD_S), stage.servo_period_s);
     if seconds / period_s > PERIODS_MAX {

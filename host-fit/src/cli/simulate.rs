@@ -3,7 +3,7 @@
 use super::arguments::{StageFile, between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::Outputs;
+use crate::output::{Outputs, kept};
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
 use hallstage_input::axis::counted;
@@ -50,6 +50,9 @@ pub(super) struct SimulateArgs {
     /// Write the true poses to this file, likewise.
     #[arg(long, value_name = "truth.csv")]
     truth: Option<PathBuf>,
+    /// Replace files that may hold measurements: also a log that was simulated.
+    #[arg(long)]
+    force: bool,
 }
 
 fn hour(text: &str) -> Result<f64, String> {
@@ -78,6 +81,10 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         None,
         inputs.into_iter().flatten().map(PathBuf::as_path),
     )?;
+    if !args.force {
+        kept::check_own(&args.out, kept::LOG)?;
+        truth.map_or(Ok(()), |path| kept::check_own(path, kept::TRUTH))?;
+    }
     let stage = args.stage.read()?;
     let period_s = stage.servo_period_s;
     let run = match (&args.plan, args.protocol) {

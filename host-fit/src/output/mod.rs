@@ -22,6 +22,7 @@ pub mod blob_file;
 mod error;
 pub mod export;
 mod file;
+pub mod kept;
 pub mod pose_file;
 pub mod posterior_file;
 pub mod record_file;

@@ -12,9 +12,35 @@ fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
     bench.bad(&format!("{both} no/such/p.json"), 3, &["folder"]);
     bench.bad(&format!("{both} ./p.bin"), 2, &["another output"]);
     assert!(!bench.has("p.bin"));
-    bench.write("old.bin", "old");
+    bench.write("old.bin", "HALL, old");
     bench.bad("fit nowhere.csv --out old.bin", 3, &["nowhere.csv"]);
-    assert_eq!(bench.read("old.bin"), b"old");
+    assert_eq!(bench.read("old.bin"), b"HALL, old");
+}
+
+#[test]
+fn what_the_command_did_not_write_is_replaced_only_by_force() {
+    let bench = Bench::with_log();
+    bench.write("old.csv", log());
+    let kept = |command: &str| bench.bad(command, 2, &["old.", "--force"]);
+    kept("fit log.csv --out old.csv");
+    kept("fit log.csv --out p.bin --json old.csv");
+    kept("plan --seconds 5 --out old.csv");
+    kept("simulate --protocol service --seed 1 --out old.csv");
+    kept("simulate --protocol service --seed 1 --out s.csv --truth old.csv");
+    bench.good("fit log.csv --out old.bin --serial A --model 31");
+    kept("decode old.bin log.csv --out old.csv");
+    kept("fit log.csv --out old.bin --serial B --model 31");
+    kept("fit log.csv --out old.bin --model 31");
+    assert_eq!(bench.text("old.csv"), log());
+    // Its own files, and by force.
+    bench.good("fit log.csv --out old.bin --serial A --model 31");
+    bench.good("fit log.csv --out old.bin --serial B --model 31 --force");
+    for file in ["pose.csv", "pose.csv", "old.csv --force", "old.csv"] {
+        bench.good(&format!("decode old.bin log.csv --out {file}"));
+    }
+    bench.good("simulate --protocol service --seed 1 --out old.csv --force");
+    bench.good("plan --seconds 5 --out old.csv --force");
+    bench.good("plan --seconds 6 --out old.csv");
 }
 
 #[test]
