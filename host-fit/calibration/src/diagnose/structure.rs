@@ -8,6 +8,7 @@
 use super::limits::{MEANS_MAX, RARITY, ROUNDS, SPANS, UNDECIDED};
 use super::mistakes::{Change, Mistake, cause, mistakes};
 use crate::judge::identify::check_motion;
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -49,6 +50,8 @@ type Covariance = SMatrix<f64, 6, 6>;
 struct Fitted {
     at: Vector,
     covariance: Covariance,
+    /// The part of the variance of the signal that is left.
+    left: f64,
 }
 
 /// The mistake that explains a log of another stage than designed, if there is one; `None` for a log without motion.
@@ -57,6 +60,15 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
     let fitted = fitted(dataset, stage.servo_period_s)?;
+    let strange = (0..3).filter(|&probe| fitted[probe].left > LEFT_MAX);
+    let strange: Vec<Channel> = strange.map(|probe| Channel::SINGLE[probe]).collect();
+    if !strange.is_empty() {
+        let found = Finding::new(Kind::NotLinear {}).with_severity(Severity::Refuse);
+        return Some(Finding {
+            channels: strange,
+            ..found
+        });
+    }
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
     let as_logged = distance(&Change::nothing());
@@ -256,9 +268,9 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
         let found = Fitted {
             at: at.fixed_rows::<6>(0).into(),
             covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
+            left,
         };
-        let is_linear = left < LEFT_MAX && found.at.iter().all(|x| x.is_finite());
-        is_linear.then_some(found)
+        found.at.iter().all(|x| x.is_finite()).then_some(found)
     };
     Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
 }

@@ -251,7 +251,11 @@ fn what_is_not_linear_is_no_mistake_with_channels() {
         s.hall[1] = i32::from((s.hall[1] + 32_768) as i16)
     });
     for dataset in folded.into_iter().chain(wrapped) {
-        assert_eq!(structure(&dataset, &stage, true), None);
+        let found = structure(&dataset, &stage, true).expect("a finding");
+        assert_eq!(
+            (found.kind, found.channels),
+            (Kind::NotLinear {}, vec![HallB])
+        );
     }
 }
 

@@ -76,6 +76,10 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::ChangesOften {} => {
             format!("{on} changes more than twice. Its course between the changes is unknown, so the calibration is not free of it")
         }
+        Kind::NotLinear {} => {
+            let titles: Vec<&str> = found.channels.iter().map(|channel| channel.title()).collect();
+            format!("the signal of {} does not follow the motion of the reference, in this log or in a part of it, and no order, sign or scale explains it", titles.join(" and "))
+        }
         Kind::Inconsistent { ratio } => {
             let like = match on {
                 "" => String::new(),

@@ -63,6 +63,7 @@ fn remedy(found: &Finding) -> String {
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",
         Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => "is it connected?",
         Kind::ChangesOften {} => "let it warm up, look for loose contacts, and record the log again",
+        Kind::NotLinear {} => "look at its codes, and fit the logs one by one",
         Kind::Inconsistent { .. } => "check that channel and the reference, and record the log again",
         Kind::FaultsTogether { .. } => "see the other findings, and record the log again",
         Kind::OtherProbes { .. } => "check order and signs of all channels, the scales and the designed values in stage.toml",

@@ -192,6 +192,8 @@ kinds! {
     FaultsTogether { ratio: f64 } => Code::NotDetermined;
     /// A mistake with channels, scales or places; several causes where the log cannot tell them apart.
     Mistake { code: Code, causes: Vec<Cause>, is_sure: bool, may_be_magnets: bool } => *code, size_of_mistake(causes)?.0, size_of_mistake(causes)?.1;
+    /// A Hall signal does not follow the reference: no order, sign, scale or place explains it.
+    NotLinear {} => Code::ModelLacks;
     /// The probes are so far from the drawing, in tolerances, and no single mistake explains it.
     OtherProbes { tolerances: f64 } => Code::TermsAtLimit;
 
