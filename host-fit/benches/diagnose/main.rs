@@ -14,7 +14,6 @@ use host_fit::calibration::diagnose::structure::structure;
 use host_fit::calibration::fit::{FitError, FitSettings, ModelChoice, fit};
 use host_fit::calibration::plan::plan;
 use host_fit::calibration::words::message;
-use host_fit::input::channel::Channel;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::finding::{Code, Finding, Severity};
 use host_fit::input::shipped;
@@ -22,7 +21,6 @@ use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
-use std::f64::consts::TAU;
 
 /// Number of clean stages. Each has one of the three kinds of log.
 const CLEAN: u64 = 200;
@@ -33,6 +31,7 @@ fn main() {
     let stage = shipped::stage();
     let planned = plan(&stage, 20.0).expect("a plan").run;
     let planned = planned.trajectory(stage.servo_period_s);
+    faults::table(&stage, &planned, 2000..2004);
     clean(&stage, &planned);
     println!("{:<36}{:>9}", "mistake", "named");
     for (title, code, mistake) in MISTAKES {
@@ -46,54 +45,6 @@ fn main() {
         println!("{title:<36}{named:>6}/{FAULTY}");
     }
     paper::table(&stage, 7000..7024);
-    faults::table(&stage, &planned, 2000..2004);
-    println!("{:<36}{:>9}", "fault of Hall A", "named");
-    for (title, code, spoil) in SIGNALS {
-        let named = (1..=FAULTY).filter(|seed| {
-            let mut log = recording(&stage, &planned, 1000 + seed);
-            spoil(&mut log, &stage);
-            let (found, _) = grave(&dataset(&log, &stage), &stage);
-            let is_named =
-                |found: &Finding| found.code() == code && found.channels() == [Channel::SINGLE[0]];
-            found.iter().any(is_named)
-        });
-        println!("{title:<36}{:>6}/{FAULTY}", named.count());
-    }
-}
-
-/// A fault of the signal of Hall A without a cost of its own, and the code of its finding.
-type Signal = (&'static str, Code, fn(&mut Recording, &Stage));
-
-const SIGNALS: [Signal; 3] = [
-    ("ten jumps of 3 um", Code::Outliers, |log, stage| {
-        let apart = log.rows() / 10;
-        let samples = log.movements.iter_mut().flatten().skip(apart / 2);
-        for (k, sample) in samples.step_by(apart).enumerate() {
-            add(sample, stage, if k % 3 == 0 { -3.0 } else { 3.0 });
-        }
-    }),
-    ("hum of 50 Hz, 0.2 um", Code::Hum, |log, stage| {
-        for (row, sample) in log.movements.iter_mut().flatten().enumerate() {
-            let turns = 50.0 * row as f64 * stage.servo_period_s;
-            add(sample, stage, 0.2 * (TAU * turns).sin());
-        }
-    }),
-    ("stuck for 0.2 s", Code::Stuck, |log, stage| {
-        let movement = log.movements.len() / 2;
-        let rows = &mut log.movements[movement];
-        let first = rows.len() / 3;
-        let end = rows
-            .len()
-            .min(first + (0.2 / stage.servo_period_s) as usize);
-        let held = rows[first].hall[0];
-        rows[first..end]
-            .iter_mut()
-            .for_each(|sample| sample.hall[0] = held);
-    }),
-];
-
-fn add(sample: &mut Sample, stage: &Stage, um: f64) {
-    sample.hall[0] += (um * 1e-6 / stage.hall.m_per_count).round() as i32;
 }
 
 /// The warnings and refusals of `fit` for a log, and the error of the fit.
