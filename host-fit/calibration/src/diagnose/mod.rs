@@ -57,7 +57,6 @@ use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
 use faults::{Calibrated, Faults, find_faults};
-use hallstage_input::channel::Channel;
 use hallstage_input::channels::{Column, columns};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
@@ -130,7 +129,7 @@ pub fn diagnose_log(
         Ok(_) => true,
         Err(error) => matches!(error, FitError::Failed(FitFailure::NotDescribed { .. })),
     };
-    out.add_faults(
+    let probe_lags_s = out.add_faults(
         dataset,
         &without_outliers,
         stage,
@@ -153,17 +152,24 @@ pub fn diagnose_log(
         Err(_) => Basis::NoFit,
     };
     out.motion = fitted.ok().and_then(|fit| {
-        let (motion, parameters) = (&fit.estimate.motion, &fit.estimate.parameters);
-        let motion = out.probes_in_motion(motion);
+        let (mut motion, parameters) = (fit.estimate.motion, &fit.estimate.parameters);
+        if let Some(repair) = &out.repair {
+            motion = MotionFit {
+                probe_lag_covariance: motion.probe_lag_covariance,
+                ..repair.motion
+            };
+        }
+        if let Some(lags_s) = probe_lags_s {
+            motion = motion.with_other_lags(lags_s);
+        }
         InMotion::new(&motion, parameters, stage, out.predicted.as_ref()?)
     });
+    let mut stays = [0.0; 3];
     if let (Some(motion), Some(at_rest)) = (out.motion, out.predicted) {
         out.findings.extend(motion.finding(&at_rest));
-        out.conclude(basis);
-        out.predicted = Some(at_rest.with_added(motion.added));
-    } else {
-        out.conclude(basis);
+        stays = motion.added;
     }
+    out.conclude(stays, basis);
     out.validity = field.and_then(|_| {
         let estimate = fitted.ok().map(|fit| &fit.estimate)?;
         let (mut parameters, mut covariance) =
@@ -232,8 +238,8 @@ const fn stands(found: &Finding) -> bool {
 }
 
 impl Diagnosis {
-    /// Adds the faults of signals, channels and structure, and what they predict. `is_described` where the
-    /// parameters describe the log.
+    /// Adds the faults of signals, channels and structure, and what they predict. The lags of A, B, C behind their
+    /// mean, s, where the log shows them. `is_described` where the parameters describe the log.
     fn add_faults(
         &mut self,
         dataset: &Dataset,
@@ -241,7 +247,7 @@ impl Diagnosis {
         stage: &Stage,
         (by, lag_s): (Calibrated, f64),
         is_described: bool,
-    ) {
+    ) -> Option<[f64; 3]> {
         let (findings, bad) =
             signals::signal_findings(dataset, stage, &self.columns, (by.start, lag_s));
         self.findings = findings;
@@ -259,10 +265,10 @@ impl Diagnosis {
             let mistake = structure::structure(without_outliers, stage, disagree);
             self.findings.extend(mistake);
         }
-        let Some(mut of) = of_rows else { return };
+        let mut of = of_rows?;
         self.predicted = of.predicted;
         if is_refused(&self.findings) {
-            return;
+            return None;
         }
         if let Some((repair, expected)) = of.repair {
             let stand = self.findings.iter_mut().filter(|found| stands(found));
@@ -274,26 +280,7 @@ impl Diagnosis {
             (self.predicted, self.repair) = (Some(expected), Some(repair));
         }
         self.findings.extend(of.findings);
-    }
-
-    /// The probes in motion, by a fit: as the repair has them, and without the lags where a beam is late.
-    fn probes_in_motion(&self, fitted: &MotionFit) -> MotionFit {
-        let is_late_beam = |found: &Finding| {
-            let beams = [Channel::BeamX, Channel::BeamY1, Channel::BeamY2];
-            found.code() == Code::ReferenceLag
-                && found
-                    .channels()
-                    .iter()
-                    .any(|channel| beams.contains(channel))
-        };
-        match &self.repair {
-            Some(repair) => MotionFit {
-                probe_lag_covariance: fitted.probe_lag_covariance,
-                ..repair.motion
-            },
-            None if self.findings.iter().any(is_late_beam) => fitted.with_other_lags([0.0; 3]),
-            None => *fitted,
-        }
+        of.probe_lags_s
     }
 
     /// Adds the findings about the fit that no fault explains.
@@ -329,9 +316,12 @@ impl Diagnosis {
         }
     }
 
-    fn conclude(&mut self, basis: Basis) {
+    /// Findings and verdict, with variances that sensors add in service because they stay late.
+    fn conclude(&mut self, stays: [f64; 3], basis: Basis) {
         let findings = std::mem::take(&mut self.findings);
-        (self.findings, self.verdict) = conclude(findings, self.predicted.as_ref(), basis);
+        let predicted = self.predicted.as_ref();
+        (self.findings, self.verdict) = conclude(findings, predicted, stays, basis);
+        self.predicted = predicted.map(|of| of.with_added(stays));
     }
 
     /// The faults of the log that the calibration is free of.
@@ -397,6 +387,6 @@ pub fn diagnose_blob(
             Basis::Blob { is_for_service }
         }
     };
-    out.conclude(basis);
+    out.conclude([0.0; 3], basis);
     out
 }

@@ -53,10 +53,12 @@ pub enum Basis {
 }
 
 /// Findings without the consequences of others, the most severe first, and the verdict; it is `None` for a blob
-/// where the log cannot predict its errors.
+/// where the log cannot predict its errors. Sensors that stay late add the variances `stays` to `predicted`: the
+/// calibration is not at fault, so they do not refuse it.
 pub fn conclude(
     mut findings: Vec<Finding>,
     predicted: Option<&Predicted>,
+    stays: [f64; 3],
     basis: Basis,
 ) -> (Vec<Finding>, Option<Verdict>) {
     if let Basis::Blob { .. } = basis {
@@ -69,6 +71,12 @@ pub fn conclude(
     let mut ranked: Vec<Finding> = findings.iter().filter(is_cause).cloned().collect();
     ranked.sort_by_key(|found| std::cmp::Reverse(found.severity));
     let ratio = predicted.map(Predicted::worst_ratio);
+    let in_service = predicted.map(|of| of.with_added(stays).worst_ratio());
+    let decide =
+        |findings: &[Finding], is_for_service| match decide(findings, ratio, is_for_service) {
+            Verdict::Good if in_service > Some(GOOD_MAX) => Verdict::Limited,
+            verdict => verdict,
+        };
     let verdict = match basis {
         Basis::NoFit => Some(Verdict::Refused),
         Basis::Fit { is_for_service } => {
@@ -80,10 +88,10 @@ pub fn conclude(
                 let together = Finding::new(Kind::FaultsTogether { ratio });
                 ranked.insert(0, together.with_cost(ratio));
             }
-            Some(decide(&ranked, ratio, is_for_service))
+            Some(decide(&ranked, is_for_service))
         }
-        Basis::Blob { is_for_service } => ratio.map(|_| decide(&ranked, ratio, is_for_service)),
-        Basis::Recalibrated => match decide(&ranked, ratio, true) {
+        Basis::Blob { is_for_service } => ratio.map(|_| decide(&ranked, is_for_service)),
+        Basis::Recalibrated => match decide(&ranked, true) {
             // A fault bends the parameters that were found.
             Verdict::Good if ranked.iter().any(|found| found.cost > Some(GOOD_MAX)) => {
                 Some(Verdict::Limited)
@@ -173,7 +181,7 @@ mod tests {
     }
 
     fn ranked(findings: Vec<Finding>) -> Vec<Finding> {
-        conclude(findings, None, Basis::NoFit).0
+        conclude(findings, None, [0.0; 3], Basis::NoFit).0
     }
 
     #[test]
@@ -231,11 +239,14 @@ mod tests {
             ratio: [1.0; 3],
             range: [[1e-6; 2]; 3],
         };
-        let verdict = |findings, basis| conclude(findings, Some(&good), basis).1;
+        let verdict = |findings, basis| conclude(findings, Some(&good), [0.0; 3], basis).1;
         let fit = Basis::Fit {
             is_for_service: true,
         };
         assert_eq!(verdict(vec![], fit), Some(Verdict::Good));
+        let with = |stays: f64| conclude(vec![], Some(&good), [0.0, stays, 0.0], fit).1;
+        assert_eq!(with(0.2e-12), Some(Verdict::Good));
+        assert_eq!(with(9e-12), Some(Verdict::Limited));
         let late = |channel| change(Quantity::Time, TimeCourse::Constant, channel);
         assert_eq!(
             verdict(vec![late(Channel::BeamX)], fit),
@@ -261,6 +272,6 @@ mod tests {
             is_for_service: true,
         };
         assert_eq!(verdict(vec![costly()], blob), Some(Verdict::Good));
-        assert_eq!(conclude(vec![], None, blob).1, None);
+        assert_eq!(conclude(vec![], None, [0.0; 3], blob).1, None);
     }
 }

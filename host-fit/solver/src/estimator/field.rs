@@ -245,7 +245,7 @@ impl WhiteFit {
         };
         let shows_acceleration = self.shows_acceleration && MotionFit::is_shown_by(&covariance);
         let motion = MotionFit::new(self.at.values.as_slice(), &covariance, shows_acceleration);
-        let [floor_mm, _] = floor_mm(&self.rows, self.noise.white_mm, stage);
+        let floor_mm = floor_mm(&self.rows, self.noise.white_mm, stage);
         let floor = Noise {
             white_mm: floor_mm,
             ..self.noise

@@ -45,10 +45,10 @@ pub fn white_mm(
 /// at most 1.14 times that noise.
 const NOISY: f64 = 1.3;
 
-/// The noise of the probes A, B, C that makes the noise floor in service, and the noise of a noisy probe beyond that, mm.
-/// The noise is from fifth differences of the readings, which have 252 times the variance of the noise and hardly see
-/// motion, so no reference raises the floor. A probe that is noisier than its kind counts as the middle probe.
-pub fn floor_mm(rows: &Rows, white_mm: [f64; 3], stage: &Stage) -> [[f64; 3]; 2] {
+/// The noise of the probes A, B, C that makes the noise floor in service, mm: from fifth differences of the readings, which
+/// have 252 times the variance of the noise and hardly see motion, so no reference raises the floor. A probe that is
+/// noisier than its kind counts as the middle probe.
+pub fn floor_mm(rows: &Rows, white_mm: [f64; 3], stage: &Stage) -> [f64; 3] {
     const FIFTH: [f64; 6] = [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0];
     let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
     let own_mm = [0, 1, 2].map(|probe| {
@@ -60,13 +60,11 @@ pub fn floor_mm(rows: &Rows, white_mm: [f64; 3], stage: &Stage) -> [[f64; 3]; 2]
         (robust_deviation(windows.map(sum)) / 252f64.sqrt()).max(least_mm)
     });
     let usual_mm = median(&mut own_mm.clone()).unwrap_or(least_mm);
-    let is_noisy = own_mm.map(|own| own > NOISY * usual_mm);
-    let floor = |k: usize| if is_noisy[k] { usual_mm } else { own_mm[k] }.min(white_mm[k]);
-    let beyond = |k: usize| match is_noisy[k] {
-        true => (own_mm[k] * own_mm[k] - usual_mm * usual_mm).sqrt(),
-        false => 0.0,
+    let floor = |k: usize| match own_mm[k] > NOISY * usual_mm {
+        true => usual_mm,
+        false => own_mm[k].min(white_mm[k]),
     };
-    [[0, 1, 2].map(floor), [0, 1, 2].map(beyond)]
+    [0, 1, 2].map(floor)
 }
 
 /// Means over a span of about [`SPAN_S`], as poses.
@@ -260,19 +258,17 @@ mod tests {
             floor_mm(&Rows::new(dataset, &all), white_mm, &stage())
         };
         let own_mm = Run::EIGHT_SECONDS.white_m * 1e3;
-        let [sound_mm, beyond_mm] = floor(&dataset, [1.0; 3]);
+        let sound_mm = floor(&dataset, [1.0; 3]);
         assert!(
             sound_mm.iter().all(|mm| (mm / own_mm - 1.0).abs() < 0.1),
             "{sound_mm:?}"
         );
-        assert_eq!(beyond_mm, [0.0; 3]);
         // Residuals are smaller where the reference has the same noise.
         let least_mm = [0.1 * own_mm, 1.0, 1.0];
-        assert_eq!(floor(&dataset, least_mm)[0][0], least_mm[0]);
+        assert_eq!(floor(&dataset, least_mm)[0], least_mm[0]);
         for (k, row) in dataset.rows.iter_mut().enumerate() {
             row.signal_m[1] += if k % 2 == 0 { 3e-6 } else { -3e-6 };
         }
-        let [noisy_mm, beyond_mm] = floor(&dataset, [1.0; 3]);
-        assert!(sound_mm.contains(&noisy_mm[1]) && beyond_mm[1] > 3.0 * own_mm);
+        assert!(sound_mm.contains(&floor(&dataset, [1.0; 3])[1]));
     }
 }

@@ -1,18 +1,20 @@
 //! What the residuals still show after all faults: errors that follow the motion, and slow errors that nothing explains.
 
-use super::estimate::{Estimate, RESIDUAL};
+use super::estimate::{Estimate, RESIDUAL, Row};
 use super::means::Means;
 use super::motion::{Follows, Moving};
 use super::score::{Step, steps};
+use super::slow::{groups, slow_mm2};
 use hallstage_solver::estimator::dynamics::{PER_ACCELERATION, PROBE_LAG_S};
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::{ACCELERATIONS, PROBE_LAGS, UNKNOWNS};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::Range;
 
-/// Rows are taken together for this time, s, or longer in logs with more groups than [`GROUPS_MAX`].
-const TOGETHER_S: f64 = 0.04;
-const GROUPS_MAX: f64 = 2000.0;
+/// Rows are taken together for this time, s: motion of service is slower, and misfit counts at its frequencies.
+const TOGETHER_S: f64 = 0.1;
+/// Groups of rows that are taken together for the misfit at the frequencies of service.
+const SLOWER: usize = 3;
 /// Errors of channels that are taken into account at most.
 const ERRORS_MAX: usize = 8;
 /// An error is left out where the parameters can follow all but this part of it: the log hardly shows it.
@@ -22,11 +24,8 @@ const GAIN_MIN: f64 = 28.0;
 /// An error of a sensor is taken where the error of a beam explains the log better by less than this: in service there are
 /// no beams.
 const BEAM_GAIN: f64 = 20.0;
-/// Residuals up to 10 Hz and up to 0.5 Hz: means over this time, s, and their power over the expected power, sound logs have
-/// at most 1.08 and 1.46.
-const BANDS: [(f64, f64); 2] = [(TOGETHER_S, 1.32), (1.0, 1.69)];
-/// The same, in standard deviations of the power.
-const BAND_CLEAR: f64 = 4.5;
+/// Information below this part of an unknown's own is rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// What the residuals show.
 pub(super) struct Evidence {
@@ -36,6 +35,10 @@ pub(super) struct Evidence {
     pub(super) shift: DVector<f64>,
     /// How much less certain they make the parameters.
     pub(super) added: DMatrix<f64>,
+    /// Change of the sizes of the faults beside these errors.
+    pub(super) sizes: Vec<f64>,
+    /// Lags of A, B, C behind their mean beside these errors, s.
+    pub(super) probe_lags_s: [f64; 3],
     /// Variances of slow residuals of A, B, C that nothing explains, mm2.
     pub(super) slow_mm2: [f64; 3],
 }
@@ -43,11 +46,14 @@ pub(super) struct Evidence {
 impl Evidence {
     pub(super) fn new(means: &Means, estimate: &Estimate, moving: &Moving) -> Option<Self> {
         let candidates: Vec<(usize, Follows)> = (0..9)
-            .flat_map(|channel| Follows::of_channel(channel).map(move |follows| (channel, follows)))
+            .flat_map(|channel| {
+                let follows = Follows::of_channel(channel).into_iter();
+                follows.map(move |follows| (channel, follows))
+            })
             .collect();
         let known = UNKNOWNS + estimate.sizes().len();
         let residual = known + candidates.len();
-        let groups = groups(means);
+        let groups = groups(means, TOGETHER_S);
         let mut table = DMatrix::zeros(3 * groups.len(), residual + 1);
         let steps = steps(estimate)?;
         for (j, &(channel, follows)) in candidates.iter().enumerate() {
@@ -83,17 +89,33 @@ impl Evidence {
             }
         }
         let own: Vec<f64> = (0..residual).map(|j| products[(j, j)]).collect();
-        (0..known).for_each(|k| sweep(&mut products, k));
+        for (k, own) in own.iter().enumerate().take(known) {
+            let least = if k < UNKNOWNS { ROUNDING } else { SEEN_MIN };
+            sweep(&mut products, k, least * own);
+        }
         let before = estimate.curvature.inverse();
-        let freedom = table.nrows().saturating_sub(known).max(1) as f64;
-        let misfit = |products: &DMatrix<f64>| (products[(residual, residual)] / freedom).max(1.0);
+        let freedom = table.nrows().saturating_sub(known).max(table.nrows() / 2) as f64;
+        // Noise that is not white is largest at the frequencies of motion.
+        let misfit = |products: &DMatrix<f64>, chosen: &[usize]| {
+            let mut left = table.column(residual).into_owned();
+            for j in (0..known).chain(chosen.iter().copied()) {
+                left.axpy(-products[(j, residual)], &table.column(j), 1.0);
+            }
+            let slow = left.as_slice().chunks(3 * SLOWER).map(|few| {
+                let share = 3.0 / few.len() as f64;
+                let sum = |k: usize| few.iter().skip(k).step_by(3).sum::<f64>();
+                share * [0, 1, 2].map(|k| sum(k).powi(2)).iter().sum::<f64>()
+            });
+            // The parameters follow up to half of that.
+            let slow = slow.sum::<f64>() / (0.5 * (table.nrows() / SLOWER) as f64);
+            (products[(residual, residual)] / freedom)
+                .max(slow)
+                .max(1.0)
+        };
         let mut chosen: Vec<usize> = Vec::new();
         while chosen.len() < ERRORS_MAX {
-            let misfit = misfit(&products);
-            let gain = |&j: &usize| {
-                let score = products[(j, residual)];
-                score * score / (products[(j, j)] * misfit)
-            };
+            let misfit = misfit(&products, &chosen);
+            let gain = |&j: &usize| products[(j, residual)].powi(2) / (products[(j, j)] * misfit);
             let is_seen =
                 |j: &usize| !chosen.contains(j) && products[(*j, *j)] > SEEN_MIN * own[*j];
             let value = |j: &usize| {
@@ -104,13 +126,23 @@ impl Evidence {
             let Some(best) = likely.max_by(|a, b| value(a).total_cmp(&value(b))) else {
                 break;
             };
-            sweep(&mut products, best);
+            sweep(&mut products, best, 0.0);
             chosen.push(best);
         }
-        let mut left = table.column(residual).into_owned();
-        for &j in (0..known).collect::<Vec<_>>().iter().chain(&chosen) {
-            left.axpy(-products[(j, residual)], &table.column(j), 1.0);
+        let left = |row: &Row| {
+            Vector3::from_fn(|k, _| {
+                let known = (0..known).map(|j| row[k][j] * products[(j, residual)]);
+                row[k][RESIDUAL] - known.sum::<f64>()
+            })
+        };
+        let mut left: Vec<Vector3<f64>> = estimate.rows.iter().map(left).collect();
+        for &j in &chosen {
+            let (channel, follows) = candidates[j - known];
+            let white = whitened(means, &steps, |at| moving.signals(at, channel, follows));
+            let pairs = left.iter_mut().zip(white);
+            pairs.for_each(|(left, white)| *left -= white * products[(j, residual)]);
         }
+        let [a, b] = [0, 1].map(|k| products[(PROBE_LAGS + k, residual)]);
         let size = |&j: &usize| {
             let (channel, follows) = candidates[j - known];
             (channel, follows, products[(j, residual)])
@@ -119,8 +151,10 @@ impl Evidence {
             errors: chosen.iter().map(size).collect(),
             shift: DVector::from_fn(COUNT, |k, _| products[(k, residual)]),
             added: (products.view((0, 0), (COUNT, COUNT)) - before.view((0, 0), (COUNT, COUNT)))
-                * misfit(&products),
-            slow_mm2: slow_mm2(means, &groups, left.as_slice()),
+                * misfit(&products, &chosen),
+            sizes: (UNKNOWNS..known).map(|k| products[(k, residual)]).collect(),
+            probe_lags_s: [a, b, -a - b],
+            slow_mm2: slow_mm2(means, &left),
         })
     }
 }
@@ -144,26 +178,6 @@ fn whitened(
     white
 }
 
-/// Means that are taken together.
-fn groups(means: &Means) -> Vec<Range<usize>> {
-    let time_s = |at: usize| means.rows.rows[at].time_s;
-    let movements = means.rows.movements.iter();
-    let lasts_s: f64 = movements.map(|m| time_s(m.end - 1) - time_s(m.start)).sum();
-    let together_s = TOGETHER_S.max(lasts_s / GROUPS_MAX);
-    let mut groups = Vec::new();
-    for movement in &means.rows.movements {
-        let mut start = movement.start;
-        for at in movement.clone() {
-            if time_s(at) - time_s(start) >= together_s {
-                groups.push(start..at);
-                start = at;
-            }
-        }
-        groups.push(start..movement.end);
-    }
-    groups
-}
-
 /// Sums of white numbers over groups, with the variance of one.
 fn fill(
     table: &mut DMatrix<f64>,
@@ -181,10 +195,12 @@ fn fill(
 }
 
 /// Solves for an unknown of normal equations in place: its row of the last column becomes its value, its block the
-/// covariance, and the other rows lose what it explains.
-fn sweep(products: &mut DMatrix<f64>, k: usize) {
+/// covariance, and the other rows lose what it explains. An unknown that others replace is left out.
+fn sweep(products: &mut DMatrix<f64>, k: usize, least: f64) {
     let pivot = products[(k, k)];
-    if pivot <= 0.0 {
+    if pivot <= least {
+        products.row_mut(k).fill(0.0);
+        products.column_mut(k).fill(0.0);
         return;
     }
     let by = products.column(k) / pivot;
@@ -195,50 +211,4 @@ fn sweep(products: &mut DMatrix<f64>, k: usize) {
     }
     products.set_column(k, &(-by));
     products[(k, k)] = 1.0 / pivot;
-}
-
-/// Variances of A, B, C by residuals up to 10 Hz beyond noise and drift, mm2.
-fn slow_mm2(means: &Means, groups: &[Range<usize>], white: &[f64]) -> [f64; 3] {
-    let rows = |at: usize| means.rows.rows[at].weight;
-    [0, 1, 2].map(|k| {
-        let (mut slower, mut variance) = ((0.0, 0.0), 0.0);
-        for (time_s, limit) in BANDS.into_iter().rev() {
-            let (mut squares, mut count, mut all_rows) = (0.0, 0.0, 0.0);
-            let mut sum = (0.0, 0.0);
-            let mut start = 0;
-            let mut end = |sum: &mut (f64, f64)| {
-                if sum.1 > 0.0 {
-                    squares += sum.0 * sum.0 / sum.1;
-                    count += 1.0;
-                }
-                *sum = (0.0, 0.0);
-            };
-            for (at, group) in groups.iter().enumerate() {
-                let (first, here) = (
-                    &means.rows.rows[groups[start].start],
-                    &means.rows.rows[group.start],
-                );
-                let is_later = !(0.0..time_s).contains(&(here.time_s - first.time_s + 1e-6));
-                if is_later {
-                    end(&mut sum);
-                    start = at;
-                }
-                let len = group.len() as f64;
-                sum = (sum.0 + white[3 * at + k] * len.sqrt(), sum.1 + len);
-                all_rows += group.clone().map(rows).sum::<f64>();
-            }
-            end(&mut sum);
-            let own = count - slower.1;
-            if own < 1.0 {
-                continue;
-            }
-            let power = (squares - slower.0) / own;
-            if power > limit.max(1.0 + BAND_CLEAR * (2.0 / own).sqrt()) {
-                let per_mean = means.white_mm[k] * means.white_mm[k] * count / all_rows;
-                variance += (power - 1.0) * per_mean * own / count;
-            }
-            slower = (squares, count);
-        }
-        variance
-    })
 }

@@ -26,9 +26,8 @@ pub(super) struct Means {
     pub(super) first: Vec<usize>,
     /// White noise of A, B, C from row to row, mm.
     pub(super) white_mm: [f64; 3],
-    /// The noise of the probes that makes the noise floor, and the noise of a noisy probe beyond that, mm: see
-    /// [`floor_mm`].
-    pub(super) floor_mm: [[f64; 3]; 2],
+    /// The noise of the probes that makes the noise floor, mm.
+    pub(super) floor_mm: [f64; 3],
     /// Errors of the resets, mm, mm, mrad, where they are declared.
     pub(super) resets_mm: Option<[f64; 3]>,
     /// Prior standard deviation of what acceleration adds to the readings, mm per m/s2.

@@ -8,6 +8,7 @@
 //! | `score` | the fault that explains the residuals best, with the parameters profiled out |
 //! | `motion` | errors of channels that follow the motion, in a log and in service |
 //! | `evidence` | what the residuals still show after all faults |
+//! | `slow` | slow residuals beyond noise and drift |
 //! | `unexplained` | the cost of that in service |
 //! | `findings` | the faults as findings |
 
@@ -20,6 +21,7 @@ mod motion;
 mod score;
 #[cfg(test)]
 mod service_tests;
+mod slow;
 #[cfg(test)]
 mod tests;
 mod unexplained;
@@ -70,6 +72,8 @@ pub struct Faults {
     /// The parameters without the faults, and their errors in service, where the faults are clear and this
     /// makes a good calibration.
     pub repair: Option<(Repair, Predicted)>,
+    /// Lags of A, B, C behind their mean, s, where the log shows them.
+    pub probe_lags_s: Option<[f64; 3]>,
     /// The residuals over their noise, after all faults: 1 for a sound log.
     pub residual: f64,
 }
@@ -216,7 +220,7 @@ impl Finder<'_> {
 
     fn faults(&self, faultless: &Estimate) -> Option<Faults> {
         let by = self.calibrated;
-        let declared = declared_service(self.stage, by.parameters, self.means.floor_mm[0])?;
+        let declared = declared_service(self.stage, by.parameters, self.means.floor_mm)?;
         let own = self.own_curvature(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;
@@ -240,8 +244,8 @@ impl Finder<'_> {
         let alone = |finding: Finding, predicted: Predicted| Faults {
             findings: vec![finding],
             predicted: Some(predicted),
-            repair: None,
             residual,
+            ..Faults::default()
         };
         let mut out = if decides && !by.is_fitted {
             // That is no fault of parameters from another log.
@@ -321,10 +325,13 @@ impl Finder<'_> {
         let covariance = estimate.covariance() * inflation;
         let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
         // Other models lack terms, and are not for service.
-        let unexplained = match self.calibrated.model {
-            ModelKind::Field => Some(Unexplained::new(self, (faults, estimate), declared, &off)?),
-            _ => None,
+        let unexplained = match self.calibrated.is_for_service {
+            true => Some(Unexplained::new(self, (faults, estimate), declared, &off)?),
+            false => None,
         };
+        if let Some(more) = &unexplained {
+            probe_lags_s = more.probe_lags_s;
+        }
         let [predicted, expected] = match &unexplained {
             Some(more) => [
                 predicted.with_added(more.added),
@@ -348,10 +355,11 @@ impl Finder<'_> {
             .with_other_lags(probe_lags_s),
         };
         let judged = if is_better { &expected } else { &predicted };
-        findings.extend(unexplained.and_then(|more| more.finding(judged)));
+        findings.extend(unexplained.as_ref().and_then(|more| more.finding(judged)));
         Some(Faults {
             findings,
             predicted: Some(predicted),
+            probe_lags_s: unexplained.is_some().then_some(probe_lags_s),
             repair: is_better.then_some((repair, expected)),
             residual,
         })

@@ -29,26 +29,33 @@ pub(super) enum Follows {
     Power(i32),
     /// The magnitude of its value: a gain that differs between the sides.
     Side,
+    /// Z, Rx, Ry, 1 um per mm and mrad: a gain, or crosstalk between gaps.
+    Height(usize),
 }
 
 impl Follows {
     /// The shapes of an error of one of the nine channels. The lag of a Hall probe and the effect of acceleration on it are
-    /// unknowns of the fit.
-    pub(super) fn of_channel(channel: usize) -> impl Iterator<Item = Self> {
-        let is_hall = channel < 3;
-        let is_beam = (3..6).contains(&channel);
-        let speeds = (0..6).map(Self::Speed);
-        let accelerations = (0..6).map(Self::Acceleration);
-        let others = [Self::OwnSpeed].into_iter().chain(accelerations);
+    /// unknowns of the fit; a slow beam has an error that follows acceleration, too.
+    pub(super) fn of_channel(channel: usize) -> Vec<Self> {
         let form = [Self::Power(2), Self::Power(3), Self::Side].into_iter();
-        (speeds.chain([Self::Turning]))
-            .chain(others.filter(move |_| !is_hall))
-            .chain(form.filter(move |_| !is_beam))
+        let speeds = (0..6).map(Self::Speed).chain([Self::Turning]);
+        match channel {
+            0..3 => speeds.chain(form).collect(),
+            3..6 => (speeds.chain([Self::OwnSpeed]))
+                .chain((0..6).map(Self::Acceleration))
+                .collect(),
+            _ => (speeds.chain([Self::OwnSpeed]).chain(form))
+                .chain((0..3).map(Self::Height))
+                .collect(),
+        }
     }
 
     /// Whether it is the form of a sensor's characteristic, which does not change.
     pub(super) const fn is_form(self) -> bool {
-        matches!(self, Self::Turning | Self::Power(_) | Self::Side)
+        matches!(
+            self,
+            Self::Turning | Self::Power(_) | Self::Side | Self::Height(_)
+        )
     }
 }
 
@@ -107,6 +114,7 @@ impl<'a> Moving<'a> {
             Follows::Turning => 1e-3 * rate / rate.hypot(KNEE * self.rms_rate[channel]).max(1e-9),
             Follows::Power(power) => value.powi(power),
             Follows::Side => value.abs(),
+            Follows::Height(axis) => row.vertical[axis],
         };
         self.sensed.by_channel[at][channel] * error_mm
     }
@@ -155,26 +163,25 @@ impl AtWork {
         errors: &[(usize, Follows, f64)],
     ) -> [f64; 3] {
         let moving = Moving::new(&self.rows, &self.sensed, stage, parameters, 0.0);
-        let of_channels: Vec<Vector3<f64>> = (self.poses.iter().enumerate())
-            .map(|(at, poses)| {
-                let signals = errors
-                    .iter()
-                    .map(|&(channel, follows, size)| moving.signals(at, channel, follows) * size);
-                poses * signals.sum::<Vector3<f64>>()
-            })
-            .collect();
-        let share = 1.0 / self.rows.len() as f64;
-        let mean = of_channels.iter().sum::<Vector3<f64>>() * share;
-        let mut squares = Vector3::zeros();
-        for ((poses, by), error) in self.poses.iter().zip(&self.by_parameter).zip(of_channels) {
-            let bent = Vector3::from_fn(|probe, _| {
+        let poses = self.poses.iter().zip(&self.by_parameter).enumerate();
+        let pose_errors = poses.map(|(at, (poses, by))| {
+            let signals = Vector3::from_fn(|probe, _| {
                 let own = &off[probe * PER_PROBE..(probe + 1) * PER_PROBE];
-                own.iter().zip(by[probe]).map(|(x, by)| x * by).sum()
+                -own.iter().zip(by[probe]).map(|(x, by)| x * by).sum::<f64>()
             });
-            let error = error - mean - poses * bent;
-            squares += error.component_mul(&error) * share;
+            let of_channels = errors
+                .iter()
+                .map(|&(channel, follows, size)| moving.signals(at, channel, follows) * size);
+            poses * (signals + of_channels.sum::<Vector3<f64>>())
+        });
+        let (mut sum, mut squares) = (Vector3::zeros(), Vector3::zeros());
+        for error in pose_errors {
+            sum += error;
+            squares += error.component_mul(&error);
         }
-        (squares * 1e-6).into()
+        let share = 1.0 / self.rows.len() as f64;
+        let mean = sum * share;
+        ((squares * share - mean.component_mul(&mean)) * 1e-6).into()
     }
 
     /// Variances of X, Y, Rz (m2, m2, rad2) by errors of the signals with these variances, mm2.

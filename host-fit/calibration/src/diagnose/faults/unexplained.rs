@@ -19,8 +19,8 @@ pub(super) struct Unexplained {
     pub(super) added: [f64; 3],
     /// The same after a repair.
     pub(super) after_repair: [f64; 3],
-    /// The noise of a noisy probe, which is part of them.
-    noisy: [f64; 3],
+    /// Lags of A, B, C, s, unless they are part of these errors.
+    pub(super) probe_lags_s: [f64; 3],
     /// The channel with the clearest error.
     channel: Option<Channel>,
 }
@@ -47,14 +47,25 @@ impl Unexplained {
         let is_sensor = |channel: &usize| !(3..6).contains(channel);
         let errors = evidence.errors.iter().copied();
         let mut sensors: Vec<_> = errors.filter(|(channel, ..)| is_sensor(channel)).collect();
-        // Gaps that are late stay late. The lags of Hall probes are known of the fit.
-        let sized = faults.iter().zip(estimate.sizes());
+        // Probes and gaps that are late stay late.
+        let mut probe_lags_s = evidence.probe_lags_s;
+        let sizes = estimate.sizes().iter().zip(&evidence.sizes);
+        let sized = faults.iter().zip(sizes.map(|(size, change)| size + change));
         for (fault, size) in sized.filter(|(fault, _)| fault.suspect.quantity == Quantity::Time) {
             let gaps = fault.suspect.gaps();
-            sensors.extend(gaps.map(|gap| (gap, Follows::OwnSpeed, *size)));
+            sensors.extend(gaps.map(|gap| (gap, Follows::OwnSpeed, size)));
+            if let Some(probe) = fault.suspect.late_probe() {
+                probe_lags_s[probe] += 1e-3 * size;
+            }
+        }
+        let mean_s = probe_lags_s.iter().sum::<f64>() / 3.0;
+        probe_lags_s = probe_lags_s.map(|lag_s| lag_s - mean_s);
+        if !sensors.is_empty() {
+            // Lags of the probes add to the other errors.
+            let lags_s = std::mem::take(&mut probe_lags_s).into_iter().enumerate();
+            sensors.extend(lags_s.map(|(probe, s)| (probe, Follows::OwnSpeed, 1e3 * s)));
         }
         let at_work = AtWork::new(stage, parameters)?;
-        let noisy = at_work.variance(finder.means.floor_mm[1].map(|mm| mm * mm));
         let slow = at_work.variance(evidence.slow_mm2);
         let [spread, none] = [&evidence.added, &DMatrix::zeros(COUNT, COUNT)]
             .map(|covariance| declared.variance(covariance).systematic);
@@ -78,23 +89,21 @@ impl Unexplained {
                     true => 0.0,
                     false => bent[axis] - (spread[axis] - none[axis]),
                 };
-                noisy[axis] + slow[axis] + (bent.max(stays[axis]) - known[axis]).max(0.0)
+                slow[axis] + (bent.max(stays[axis]) - known[axis]).max(0.0)
             })
         };
         Some(Self {
             added: added(off),
             after_repair: added(&[0.0; COUNT]),
-            noisy,
+            probe_lags_s,
             channel: (evidence.errors.first()).map(|(channel, ..)| Channel::SINGLE[*channel]),
         })
     }
 
     /// Where it is felt in service: the finding; `predicted` includes it.
     pub(super) fn finding(&self, predicted: &Predicted) -> Option<Finding> {
-        let ratio = |axis: usize| {
-            let variance = self.added[axis] - self.noisy[axis];
-            (1.0 + variance / predicted.noise(axis).powi(2)).sqrt()
-        };
+        let added = |axis: usize| self.added[axis] / predicted.noise(axis).powi(2);
+        let ratio = |axis: usize| (1.0 + added(axis)).sqrt();
         let ratio = ratio(0).max(ratio(1)).max(ratio(2));
         let severity = match predicted.worst_ratio() <= GOOD_MAX {
             true => Severity::Note,
