@@ -20,10 +20,10 @@ const OLD: &[u8] = b"what was there before";
 /// A command that writes a blob with its posterior and two more files, and one that writes row by row.
 const COMMANDS: [(&str, &[&str]); 2] = [
     (
-        "fit run.csv.gz --model field --out o.bin --json o.json --report o",
+        "fit run.csv.gz --model field --out o.bin --json o.json --report o --force",
         &["o.json", "o/index.html", "o.bin.posterior", "o.bin"],
     ),
-    ("decode p.bin log.csv --out o.csv", &["o.csv"]),
+    ("decode p.bin log.csv --out o.csv --force", &["o.csv"]),
 ];
 
 fn bench() -> Bench {
