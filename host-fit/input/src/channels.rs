@@ -37,6 +37,8 @@ pub struct Column {
     pub channel: Channel,
     /// The unit of its values: a code, and a picometre for beams, m.
     pub unit_m: f64,
+    /// The smallest and the largest value, m.
+    pub range_m: [f64; 2],
     /// The step of the values, m: their differences are multiples of it; 0 if all values are the same.
     pub step_m: f64,
     /// White noise from fifth differences, m; `None` without six consecutive rows.
@@ -108,10 +110,16 @@ impl Column {
         let step = codes::step(signal);
         let (noise, change) = noise::white(signal).unzip();
         let is_beam = signal.channel.is_beam();
+        let values = || signal.values.iter().copied();
+        let range = [
+            values().fold(f64::INFINITY, f64::min),
+            values().fold(f64::NEG_INFINITY, f64::max),
+        ];
         let mut column = Self {
             log,
             channel: signal.channel,
             unit_m: signal.unit_m,
+            range_m: range.map(|value| value * signal.unit_m),
             step_m: step * signal.unit_m,
             white_noise_m: noise.map(|noise| noise * signal.unit_m),
             to_siblings: None,

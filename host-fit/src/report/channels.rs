@@ -7,13 +7,14 @@ use hallstage_input::dataset::Dataset;
 /// A group for each channel of each log.
 pub fn channels(columns: &[Column], dataset: &Dataset) -> Vec<Group> {
     let of_column = |column: &Column| {
-        let um = |m: f64| figure(m * 1e6, "um");
+        let um = |m: f64| figure((m * 1e10).round() * 1e-4, "um");
         let ratio = |x: f64| figure((x * 1e3).round() * 1e-3, "");
         let several = dataset.logs.len() > 1;
         let between = |slow: bool| if slow { "held" } else { "interpolated" };
         group! {
             "channel" => column.channel.name(),
             "log" => several.then(|| dataset.logs[column.log].name()),
+            "range" => Figure::from_iter(column.range_m.map(um)),
             "step" => um(column.step_m),
             "noise" => column.white_noise_m.map(um),
             "to_siblings" => column.to_siblings.map(ratio),

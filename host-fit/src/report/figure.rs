@@ -122,6 +122,15 @@ impl Figure {
         }
     }
 
+    /// Whether it has no value.
+    pub(super) fn is_empty(&self) -> bool {
+        match self {
+            Self::None => true,
+            Self::List(all) => all.is_empty(),
+            _ => false,
+        }
+    }
+
     /// The same in a unit that reads well: angles in mrad, and where `small` lengths and angles in millionths.
     pub(super) fn readable(&self, small: bool) -> Self {
         let scaled = |value: f64, by: f64, name, error: Option<f64>| Self::Number {

@@ -62,14 +62,14 @@ impl Table {
         Self::from_rows(title, rows.collect())
     }
 
-    /// A table of these rows, which need not have the same columns.
+    /// A table of these rows, which need not have the same columns. A column without a value is left out.
     fn from_rows(title: &str, rows: Vec<NamedRow>) -> Self {
         let head = rows
             .first()
             .map_or(String::new(), |(head, ..)| head.clone());
         let mut columns = vec![head];
-        for (name, _) in rows.iter().flat_map(|(.., figures)| figures) {
-            if !columns[1..].contains(name) {
+        for (name, figure) in rows.iter().flat_map(|(.., figures)| figures) {
+            if !figure.is_empty() && !columns[1..].contains(name) {
                 columns.push(name.clone());
             }
         }
