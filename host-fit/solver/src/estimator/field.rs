@@ -49,8 +49,6 @@ pub struct FieldFit {
     pub lag: Option<ReferenceLag>,
     /// Lags of the probes, and what acceleration adds to their readings.
     pub motion: MotionFit,
-    /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
-    pub offsets_mm: Vec<[f64; 3]>,
     /// The weights of the rows used.
     pub weights: Vec<f64>,
     /// Gauss-Newton steps.
@@ -64,7 +62,7 @@ pub struct FieldFit {
 pub struct FieldFigures {
     /// The noise of the log.
     pub noise: Noise,
-    /// The terms of the log-posterior at its maximum.
+    /// How well the model describes the log.
     pub score: Score,
     /// Largest magnitudes of X, Y, Rz (m, m, rad) in the log, each movement's middle taken off.
     pub planar_range: [f64; 3],
@@ -76,15 +74,11 @@ pub struct FieldFigures {
     pub temperature: TemperatureFit,
 }
 
-/// -2 times the log-posterior is their sum, but for a constant.
+/// How well a model describes a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Sum of squares of the whitened residuals of the blocks: about three times their number.
     pub chi_squared: f64,
-    /// The logarithm of the determinant of their covariance.
-    pub log_determinant: f64,
-    /// Sum of squares of the parameters in terms of their priors' standard deviations.
-    pub prior: f64,
     /// Whitened residuals: three for each block, less three for each movement's offset.
     pub residuals: usize,
 }
@@ -262,8 +256,6 @@ impl WhiteFit {
             temperature,
             score: Score {
                 chi_squared: normal.chi_squared(),
-                log_determinant: normal.log_determinant,
-                prior: self.unknowns.prior_squares(&self.at.values),
                 residuals: 3 * counted.saturating_sub(rows.movements.len()),
             },
             noise: self.noise,
@@ -279,7 +271,6 @@ impl WhiteFit {
             },
             lag: (lag.standard_error_s > 0.0).then_some(lag),
             motion,
-            offsets_mm: self.at.offsets,
             weights: self.weights,
             iterations: self.iterations,
         })

@@ -32,8 +32,6 @@ const DAMPING_MAX: f64 = 1e8;
 pub struct Normal<const W: usize> {
     /// Products of the whitened columns, upper triangle.
     products: Vec<[f64; W]>,
-    /// The logarithm of the determinant of the residuals' covariance.
-    pub log_determinant: f64,
     /// The reference's error at the end of each movement (X, Y, Rz) and its change by each value,
     /// where the model eliminates one.
     pub ends: Vec<[[f64; W]; 3]>,
@@ -46,7 +44,6 @@ impl<const W: usize> Normal<W> {
     pub fn none() -> Self {
         Self {
             products: vec![[0.0; W]; W],
-            log_determinant: 0.0,
             ends: Vec::new(),
         }
     }
@@ -86,7 +83,6 @@ impl<const W: usize> Normal<W> {
                 *sum += x;
             }
         }
-        self.log_determinant += other.log_determinant;
         self.ends.extend(other.ends);
     }
 
