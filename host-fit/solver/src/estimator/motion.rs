@@ -4,7 +4,9 @@
 //! are the lever arm, the misalignment and eta, which together make the gain G = PM^-1 diag(1/eta);
 //! those after them are the slopes, in the order of Z, Rx, Ry.
 
-/// A motion of the stage that shows a parameter in a log.
+use hallstage_input::axis::AXES;
+
+/// A motion of the stage that shows a parameter in a log, in the order of [`AXES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Along X.
@@ -27,22 +29,12 @@ impl Motion {
 
     /// The axis, as reports name it.
     pub const fn axis(self) -> &'static str {
-        match self {
-            Self::X => "X",
-            Self::Y => "Y",
-            Self::Rz => "Rz",
-            Self::Z => "Z",
-            Self::Rx => "Rx",
-            Self::Ry => "Ry",
-        }
+        AXES[self as usize].name
     }
 
     /// um or urad.
     pub const fn micro_unit(self) -> &'static str {
-        match self {
-            Self::X | Self::Y | Self::Z => "um",
-            Self::Rz | Self::Rx | Self::Ry => "urad",
-        }
+        AXES[self as usize].micro
     }
 }
 
