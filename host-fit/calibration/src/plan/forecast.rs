@@ -5,33 +5,10 @@ use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::dynamics::ARMS_M;
 use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
-use hallstage_solver::estimator::paper::Parameters;
-use hallstage_solver::estimator::parameters::{FALL_PER_M, FieldParameters};
+use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use hallstage_solver::estimator::whiten::Noise;
-use runtime::model::Sensitivity;
 use std::f64::consts::TAU;
-
-/// The stage before its calibration: probes at their designed places over the centre lines of the
-/// magnets, with sensitivities in the middle of the search range.
-fn designed(stage: &Stage) -> FieldParameters {
-    let geometry = stage.geometry();
-    let etas = stage.search.get("eta");
-    let eta = etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high)));
-    let places = stage.places_m();
-    let sensitivity = [0, 1, 2].map(|k| {
-        // phi follows the height at the probe: Z + y Rx - x Ry.
-        let [x, y] = places[k];
-        let a = FALL_PER_M * eta[k];
-        Sensitivity {
-            eta: eta[k],
-            per_z_m: a,
-            per_rx_rad: a * y,
-            per_ry_rad: -a * x,
-        }
-    });
-    FieldParameters::from_model_31(&Parameters::from_model_31(&geometry, &sensitivity), stage)
-}
 
 /// The forecaster for a stage before its calibration: as designed, with the noise of the given logs.
 /// `None` where the probes do not determine a pose of the service.
@@ -42,7 +19,11 @@ pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
         drift_mm: sensors.drift_per_root_s.map(|drift| drift * 1e3),
     };
     let [x, y, rz, z, rx, ry] = stage.motion.axes.map(|axis| axis.service);
-    Forecaster::new(&designed(stage), &noise, ([x, y, rz], [z, rx, ry]))
+    Forecaster::new(
+        &FieldParameters::designed(stage),
+        &noise,
+        ([x, y, rz], [z, rx, ry]),
+    )
 }
 
 /// The forecast for a run that is recorded every `period_s` and sampled here every `step_s`; `None` where

@@ -56,6 +56,20 @@ impl FieldParameters {
         }
     }
 
+    /// The stage before its calibration: probes at their designed places over the centre lines of the
+    /// magnets, with sensitivities in the middle of the search range.
+    pub fn designed(stage: &Stage) -> Self {
+        let mut designed = Self::from_model_31(&Parameters::designed(stage), stage);
+        let etas = stage.search.get("eta");
+        let eta = etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high)));
+        for ((probe, eta), [x, y]) in designed.probes.iter_mut().zip(eta).zip(designed.places) {
+            // phi follows the height at the probe: Z + y Rx - x Ry.
+            let a = FALL_PER_M * eta;
+            probe[ETA..CARRY].copy_from_slice(&[eta, a, a * y, -a * x]);
+        }
+        designed
+    }
+
     /// The parameters with these values: those of A, then of B, then of C.
     pub fn from_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
