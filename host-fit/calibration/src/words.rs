@@ -8,7 +8,7 @@ mod refusal;
 mod run;
 mod verdict;
 
-pub use finding::message;
+pub use finding::{message, remedy};
 pub use fit::{model_reason, search_stopped, stopped};
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
 pub use verdict::{up_to, verdict};

@@ -34,7 +34,6 @@ pub struct Cause<'a> {
     /// The worst of theirs.
     severity: Severity,
     meaning: &'static str,
-    remedy: &'static str,
     /// Predicted errors in service over the noise floor with the worst of them alone.
     cost: Option<f64>,
     findings: Vec<Worded<'a>>,
@@ -54,7 +53,6 @@ impl<'a> Cause<'a> {
                     code: found.code(),
                     severity: found.severity,
                     meaning: found.code().entry().meaning,
-                    remedy: found.code().entry().remedy,
                     cost: found.cost,
                     findings: vec![Worded(found)],
                 }),

@@ -176,7 +176,7 @@ fn remedy(of: &Subject, verdict: Option<Verdict>) -> Option<String> {
         _ => return None,
     };
     let worst = (of.diagnosis.findings.iter()).find(|found| found.severity >= least);
-    worst.map(|found| found.code().entry().remedy.to_owned())
+    worst.map(words::remedy)
 }
 
 /// What to do next where no finding stands in the way.
@@ -216,10 +216,8 @@ mod tests {
             rows: 1,
         };
         let diagnosis = Diagnosis {
-            findings: vec![Finding::new(Kind::Hum {
-                frequency_hz: 50.0,
-                amplitude_um: 1.0,
-            })],
+            // The kind has a remedy of its own.
+            findings: vec![Finding::new(Kind::MovementsMissed { movements: vec![] })],
             verdict,
             predicted: Some(PREDICTED),
             validity: Some(Validity {
@@ -249,12 +247,7 @@ mod tests {
             (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
             (End::Written, good, true, ["good", "within 0.3 K", "eval"]),
             (End::Checked, good, true, ["good", "1.20", "host-fit fit"]),
-            (
-                End::Written,
-                limited,
-                true,
-                ["limited", "1.20", "for mains"],
-            ),
+            (End::Written, limited, true, ["limited", "1.20", "--draw"]),
             (End::Written, limited, false, ["limited", "µm in X", "plan"]),
             (End::Written, refused, true, ["refused", "1.20", "fit eval"]),
             (failed, good, true, ["refused", "7.0 times the noise", ""]),

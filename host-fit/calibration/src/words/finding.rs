@@ -45,7 +45,7 @@ fn source(found: &Finding) -> String {
 
 /// What to do: the usual remedy of the code, unless the kind needs another; empty if there is nothing to do.
 #[rustfmt::skip]
-fn remedy(found: &Finding) -> String {
+pub fn remedy(found: &Finding) -> String {
     let remedy = match &found.kind {
         Kind::Excerpt { .. } | Kind::CodesRefused { .. } | Kind::OtherModel { over_noise: None, .. } => "",
         Kind::Coefficients { deviations: None, span_k, is_field, .. } if *span_k > 0.0 || !is_field => "",
