@@ -190,12 +190,6 @@ impl Report {
         };
         let (estimate, posterior) = (&fit.estimate, &fit.estimate.posterior);
         let model_31 = estimate.parameters.model_31();
-        let mut warnings = words::messages(&log.warnings);
-        warnings.extend(words::messages(&fit.warnings(
-            dataset,
-            stage,
-            diagnosis.predicted.as_ref(),
-        )));
         let mut report = Self::from_judgement(Judged {
             set: &fit.set,
             judgement: &fit.judgement,
@@ -206,7 +200,7 @@ impl Report {
             dataset,
             skipped_rows: log.skipped_rows,
             elapsed_s,
-            warnings,
+            warnings: words::messages(&log.warnings),
             diagnosis,
             refusal,
         });

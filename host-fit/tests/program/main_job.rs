@@ -143,12 +143,12 @@ fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none
             rms(&json["errors_solver_delta"]) > 1.02 * rms(&json["errors"]),
             "{draw}"
         );
-        let warnings = json["warnings"].as_array().expect("a list");
-        let named = warnings
+        let findings = json["findings"].as_array().expect("a list");
+        let messages = findings
             .iter()
-            .filter_map(Value::as_str)
-            .filter(|warning| warning.contains("The draw has no row of"));
-        assert_eq!(named.count(), missed, "{draw}: {warnings:?}");
+            .filter_map(|found| found["message"].as_str());
+        let named = messages.filter(|message| message.contains("The draw has no row of"));
+        assert_eq!(named.count(), missed, "{draw}: {findings:?}");
     }
 }
 
