@@ -1,5 +1,7 @@
 //! The axes of charts.
 
+use super::text::trimmed;
+
 /// An axis between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis(pub f64, pub f64);
@@ -35,11 +37,7 @@ pub(super) fn short(x: f64) -> String {
         ..1e-9 => return "0".to_owned(),
         _ => return format!("{x:.0e}"),
     };
-    let text = format!("{x:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
+    trimmed(x, digits)
 }
 
 #[cfg(test)]

@@ -59,25 +59,16 @@ impl Unit {
 
 /// A figure with its unit at the end of its key.
 pub fn figure(value: f64, unit: &'static str) -> Figure {
-    let (unit, error) = (
-        Unit {
-            name: unit,
-            in_key: true,
-        },
-        None,
-    );
-    Figure::Number { value, unit, error }
+    number(value, unit, true)
 }
 
 /// A figure with a key that does not name its unit.
 pub fn bare(value: f64, unit: &'static str) -> Figure {
-    let (unit, error) = (
-        Unit {
-            name: unit,
-            in_key: false,
-        },
-        None,
-    );
+    number(value, unit, false)
+}
+
+const fn number(value: f64, name: &'static str, in_key: bool) -> Figure {
+    let (unit, error) = (Unit { name, in_key }, None);
     Figure::Number { value, unit, error }
 }
 
@@ -133,13 +124,8 @@ impl Figure {
 
     /// The same in a unit that reads well: angles in mrad, and where `small` lengths and angles in millionths.
     pub(super) fn readable(&self, small: bool) -> Self {
-        let scaled = |value: f64, by: f64, name, error: Option<f64>| Self::Number {
-            value: value * by,
-            unit: Unit {
-                name,
-                in_key: false,
-            },
-            error: error.map(|error| error * by),
+        let scaled = |value: f64, by: f64, name, error: Option<f64>| {
+            bare(value * by, name).with_error(error.map(|error| error * by))
         };
         match *self {
             Self::Number { value, unit, error } => match unit.name {

@@ -45,6 +45,11 @@ fn number(x: f64, unit: &str) -> String {
         _ if !(1e-4..1e9).contains(&size) => return format!("{x:.3e}"),
         _ => (5.0 - size.log10().floor()).clamp(0.0, 9.0) as usize,
     };
+    trimmed(x, decimals)
+}
+
+/// A number with at most this many decimals.
+pub(super) fn trimmed(x: f64, decimals: usize) -> String {
     let text = format!("{x:.decimals$}");
     match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
