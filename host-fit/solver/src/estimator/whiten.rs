@@ -329,11 +329,11 @@ mod tests {
             let mut largest: f64 = 0.0;
             for (k, block) in at(unknown, 0.0).iter().enumerate() {
                 let found: [[f64; COLUMNS]; 3] = columns(block);
-                for probe in 0..3 {
+                for (probe, row) in found.iter().enumerate() {
                     let change = before[k].residual_mm[probe] - after[k].residual_mm[probe];
-                    let error = (found[probe][unknown] - change / (2.0 * step)).abs();
+                    let error = (row[unknown] - change / (2.0 * step)).abs();
                     assert!(error < 1e-6, "{unknown}, {probe}: {error}");
-                    largest = largest.max(found[probe][unknown].abs());
+                    largest = largest.max(row[unknown].abs());
                 }
             }
             assert!(largest > 1e-3, "{unknown}: {largest}");
