@@ -28,6 +28,12 @@ const ROUNDED: f64 = 1.5;
 /// The noise of a probe is white. If it falls by more than a random walk does, the stage moves so fast.
 const MOTION: f64 = 1.0;
 
+/// The channels of the probes A, B, C.
+pub const PROBES: [Channel; 3] = [Channel::HallA, Channel::HallB, Channel::HallC];
+/// A probe or a gap is noisy from this many times the noise of its siblings: in sound logs a probe has at most 1.14 times
+/// the noise of the middle probe.
+pub const NOISY: f64 = 1.3;
+
 /// One channel of one log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
@@ -79,6 +85,18 @@ pub fn columns(dataset: &Dataset, stage: &Stage) -> Vec<Column> {
         set_motion_apart(&mut columns[first..]);
     }
     columns
+}
+
+/// The noise of the probes A, B, C that makes the noise floor in service, m: the median of the logs, from the readings
+/// alone, so no reference raises the floor. Steps that are coarser than a code are taken off, and a noisy probe counts
+/// as the middle probe.
+pub fn probe_noise_m(columns: &[Column]) -> [f64; 3] {
+    let own_m = PROBES.map(|probe| {
+        let own = columns.iter().filter(|column| column.channel == probe);
+        median(&mut own.map(Column::fine_noise_m).collect::<Vec<f64>>()).unwrap_or(0.0)
+    });
+    let usual_m = median(&mut own_m.clone()).unwrap_or(0.0);
+    own_m.map(|m| if m > NOISY * usual_m { usual_m } else { m })
 }
 
 /// Leaves out falls of the noise where all probes show motion.
@@ -137,6 +155,15 @@ impl Column {
             column.straight = rate::straight(signal, step);
         }
         column
+    }
+
+    /// Its noise with steps of one unit, m.
+    fn fine_noise_m(&self) -> f64 {
+        let [own_m2, fine_m2] = [self.step_m, self.unit_m].map(|step_m| step_m * step_m / 12.0);
+        let noise_m = self.white_noise_m.unwrap_or(0.0);
+        let noise_m2 = noise_m * noise_m - own_m2 + fine_m2;
+        // A step of more than six times the noise hides it.
+        noise_m2.max(own_m2 / 3.0).max(fine_m2).sqrt()
     }
 
     /// Whether its noise is below its step, so that it shows the rounding alone.

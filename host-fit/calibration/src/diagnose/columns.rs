@@ -2,10 +2,10 @@
 
 use super::limits::severity_of_share;
 use super::slopes::Slopes;
-use crate::judge::predicted::{Predicted, service_range};
+use crate::judge::predicted::service_range;
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::{Column, SlowRate};
+use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, probe_noise_m};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -14,8 +14,6 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::service::service_poses;
 
-/// A probe or a gap is noisy from this many times the noise of its siblings.
-const NOISY: f64 = 1.3;
 /// The noise of a probe is white, with 0.21 of the fall of a random walk. A filter is there from this fall.
 const FALL_OF_PROBE: f64 = 0.45;
 /// The noise of a beam is drift and white noise. A filter is there if it falls by more than a random walk from 75 to
@@ -27,8 +25,6 @@ const BENDS: f64 = 0.75;
 
 /// The noise of a beam is that of its reading, and no motion, below this part of the noise of a probe.
 const QUIET: f64 = 1.0 / 200.0;
-
-const PROBES: [Channel; 3] = [Channel::HallA, Channel::HallB, Channel::HallC];
 
 /// The effect of a fault.
 enum Effect {
@@ -43,11 +39,8 @@ enum Effect {
 /// The faults of the channels of all logs, one for each channel.
 pub(super) struct ColumnFaults {
     pub(super) findings: Vec<Finding>,
-    /// The variances of X, Y, Rz in service without these faults and the variances that the faults add: m2, m2, rad2.
-    floor: [f64; 3],
-    added: [f64; 3],
-    /// The variances of the noise of probes that are noisier than their siblings: other predictions have them.
-    beyond: [f64; 3],
+    /// Variances that they add to X, Y, Rz in service: m2, m2, rad2.
+    pub(super) added: [f64; 3],
 }
 
 impl ColumnFaults {
@@ -58,21 +51,19 @@ impl ColumnFaults {
         stage: &Stage,
         parameters: &FieldParameters,
     ) -> Self {
-        let is_probe = |column: &&Column| PROBES.contains(&column.channel);
-        let noise = columns.iter().filter(is_probe).filter_map(noise_m);
-        let noise_m = median(&mut noise.collect::<Vec<f64>>()).unwrap_or(0.0);
+        let probes_m = probe_noise_m(columns);
+        let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
         let by_channel = variances(stage, parameters);
-        let by_probes = |axis: usize| by_channel[..3].iter().map(|by| by[axis]).sum::<f64>();
-        let floor = [0, 1, 2].map(|axis| by_probes(axis) * noise_m * noise_m);
-        let (mut findings, mut added, mut beyond) = (Vec::new(), [0.0; 3], [0.0; 3]);
+        let floor = |axis: usize| {
+            let by_probes = by_channel.iter().zip(probes_m);
+            by_probes.map(|(by, m)| by[axis] * m * m).sum::<f64>()
+        };
+        let floor = [0, 1, 2].map(floor);
+        let (mut findings, mut added) = (Vec::new(), [0.0; 3]);
         for column in columns {
             let log = &dataset.logs[column.log];
             let mut all = Channel::SINGLE.iter().zip(by_channel);
             let by = all.find(|(channel, _)| **channel == column.channel);
-            if let (Some((_, by)), true) = (by, is_probe(&column)) {
-                let more_m2 = beyond_m2(column);
-                (0..3).for_each(|axis| beyond[axis] += by[axis] * more_m2);
-            }
             let in_service = |effect: Effect| match effect {
                 Effect::Variance(m2) => Some(by?.1.map(|by| by * m2)),
                 Effect::Bent(m) => Some(floor.map(|floor| floor * (BENDS * m / noise_m).powi(2))),
@@ -90,8 +81,6 @@ impl ColumnFaults {
             };
             // Harmless properties are in the table of channels only.
             let faults = faults(column, noise_m, log.rows.len()).map(with_cost);
-            // Movements that are too short show no noise to compare with.
-            let faults = faults.filter(|_| noise_m > 0.0);
             let worst = faults.filter(|(found, _)| found.severity > Severity::Note);
             for (found, own) in worst.take(1) {
                 findings.push(found);
@@ -102,29 +91,9 @@ impl ColumnFaults {
                 }
             }
         }
-        Self {
-            findings,
-            floor,
-            added,
-            beyond,
-        }
+        Self { findings, added }
     }
 
-    /// The errors to expect in service with these faults over the noise floor without them. A prediction has the noise of
-    /// the probes already.
-    pub(super) fn on_top_of(&self, predicted: Predicted) -> Predicted {
-        match self.added {
-            [0.0, 0.0, 0.0] => predicted,
-            added => {
-                let noise = [0, 1, 2].map(|axis| predicted.noise(axis).powi(2));
-                let change = |axis: usize| {
-                    let change = added[axis] + self.floor[axis] - noise[axis] - self.beyond[axis];
-                    change.max(added[axis] + self.floor[axis] - predicted.rms[axis].powi(2))
-                };
-                predicted.with_added([0, 1, 2].map(change)).over(self.floor)
-            }
-        }
-    }
 }
 
 /// By channel, mean over the poses of service: the variances of X, Y, Rz by a variance of the channel; zeros for
@@ -142,24 +111,6 @@ fn variances(stage: &Stage, parameters: &FieldParameters) -> [[f64; 3]; 9] {
     }
     sums[3..6].fill([0.0; 3]);
     sums
-}
-
-/// The noise of a channel before its rounding, m.
-fn noise_m(column: &Column) -> Option<f64> {
-    let rounding_m2 = column.step_m * column.step_m / 12.0;
-    let noise_m2 = column.white_noise_m?.powi(2) - rounding_m2;
-    // A step of more than six times the noise hides it.
-    Some(noise_m2.max(rounding_m2 / 3.0).sqrt())
-}
-
-/// The variance of the noise of a channel beyond the noise of its siblings, m2; 0 unless it is noisy.
-fn beyond_m2(column: &Column) -> f64 {
-    match (column.white_noise_m, column.to_siblings) {
-        (Some(noise_m), Some(ratio)) if ratio > NOISY => {
-            noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio))
-        }
-        _ => 0.0,
-    }
 }
 
 /// The faults of a channel of a log with `rows` rows, causes before their consequences; the Hall probes have this noise.
@@ -202,10 +153,8 @@ fn faults(
     let is_noisy = |ratio: &f64| *ratio > NOISY && !is_beam && shows_noise;
     let noisy = |ratio: f64| {
         let noise_um = 1e6 * noise_m;
-        (
-            Kind::Noisy { noise_um, ratio },
-            Effect::Variance(beyond_m2(column)),
-        )
+        let beyond_m2 = noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio));
+        (Kind::Noisy { noise_um, ratio }, Effect::Variance(beyond_m2))
     };
     let filled = column.straight.as_ref().map(ExactSizeIterator::len);
     let share = |filled: usize| severity_of_share(filled as f64 / rows as f64);
@@ -261,22 +210,16 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_log_has_no_finding_and_keeps_its_prediction() {
+    fn a_sound_log_has_no_finding() {
         let none = faults_of(|_, _| ());
         assert_eq!(none.findings, []);
         let short = faults_of(|k, row| row.movement = k / 5);
         assert_eq!(short.findings, []);
-        let predicted = Predicted {
-            rms: [1e-6; 3],
-            ratio: [1.02; 3],
-            range: [[1e-6, 2e-6]; 3],
-        };
-        assert_eq!(none.on_top_of(predicted), predicted);
     }
 
     /// The noise of the probes is 8 codes. A bit of 32 codes adds a variance of 256, and one probe of three has it.
     #[test]
-    fn a_missing_bit_costs_its_variance_and_the_prediction_counts_it_once() {
+    fn a_missing_bit_costs_its_variance() {
         let stuck = |bit: u32| move |_: usize, row: &mut Row| row.frame.codes.hall[0] |= 1 << bit;
         let (code, channel, cost) = only(stuck(5));
         assert_eq!((code, channel), (Code::StuckBit, Channel::HallA));
@@ -285,20 +228,6 @@ mod tests {
             cost > 1.4 && cost < (1.0f64 + 256.0 / 64.0).sqrt(),
             "{cost}"
         );
-        let faults = faults_of(stuck(5));
-        assert!(
-            faults.beyond[0] > 0.1 * faults.added[0],
-            "{:?}",
-            faults.beyond
-        );
-        let rms = [0, 1, 2].map(|axis| (faults.floor[axis] + faults.beyond[axis]).sqrt());
-        let with_noise = Predicted {
-            rms,
-            ratio: [0, 1, 2].map(|axis| rms[axis] / faults.floor[axis].sqrt()),
-            range: rms.map(|rms| [rms; 2]),
-        };
-        let ratio = faults.on_top_of(with_noise).worst_ratio();
-        assert!((ratio - cost).abs() < 1e-9, "{ratio} {cost}");
         assert_eq!(
             faults_of(stuck(1)).findings,
             [],

@@ -57,7 +57,7 @@ use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
 use faults::{Calibrated, Faults, find_faults};
-use hallstage_input::channels::{Column, columns};
+use hallstage_input::channels::{Column, columns, probe_noise_m};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -111,18 +111,19 @@ pub fn diagnose_log(
     let better = fitted.ok();
     let better = better.and_then(|fit| Described::better(fit, dataset, stage));
     let (best, poor) = better.map_or((own, None), |(best, poor)| (best, Some(poor)));
+    let mut out = Diagnosis {
+        columns: columns(logged, stage),
+        ..Diagnosis::default()
+    };
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
     let by = Calibrated {
         parameters: &own.parameters,
         start: &best.parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
+        floor_mm: probe_noise_m(&out.columns).map(|m| m * 1e3),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_fitted: fitted.is_ok(),
         shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.shows_acceleration),
-    };
-    let mut out = Diagnosis {
-        columns: columns(logged, stage),
-        ..Diagnosis::default()
     };
     // A log that determines no parameters shows nothing of its channels.
     let is_described = match fitted {
@@ -144,7 +145,7 @@ pub fn diagnose_log(
     let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
     let columns = ColumnFaults::new(&out.columns, logged, stage, &best.parameters);
-    out.predicted = out.predicted.map(|predicted| columns.on_top_of(predicted));
+    out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.added));
     out.findings.extend(columns.findings);
     let is_for_service = by.is_for_service;
     let basis = match fitted {
@@ -354,6 +355,10 @@ pub fn diagnose_blob(
     let of_31 = || FieldParameters::from_model_31(&Parameters::from_set(set), stage);
     let is_for_service = of_field.is_some();
     let parameters = &of_field.unwrap_or_else(of_31);
+    let mut out = Diagnosis {
+        columns: columns(dataset, stage),
+        ..Diagnosis::default()
+    };
     let by = Calibrated {
         parameters,
         start: parameters,
@@ -362,13 +367,10 @@ pub fn diagnose_blob(
         } else {
             set.model
         },
+        floor_mm: probe_noise_m(&out.columns).map(|m| m * 1e3),
         is_for_service,
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
-    };
-    let mut out = Diagnosis {
-        columns: columns(dataset, stage),
-        ..Diagnosis::default()
     };
     out.add_faults(dataset, dataset, stage, (by, 0.0), true);
     out.findings.extend(range::out_of_range(set, dataset));

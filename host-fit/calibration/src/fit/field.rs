@@ -3,6 +3,7 @@
 
 use super::job::{Job, check_near};
 use super::{Estimate, Fit, FitError, FittedRows, ModelReason};
+use hallstage_input::channels::{columns, probe_noise_m};
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::field::WhiteFit;
 use hallstage_solver::estimator::model::Model;
@@ -61,7 +62,8 @@ impl Job<'_> {
     pub(super) fn fit_field(&self, model: &'static Model) -> Result<Fit, FitError> {
         let started = Instant::now();
         let first = self.first_phase()?;
-        let found = first.field.clone().finish(self.stage)?;
+        let floor_mm = probe_noise_m(&columns(self.dataset, self.stage)).map(|m| m * 1e3);
+        let found = first.field.clone().finish(self.stage, floor_mm)?;
         let comparison = found.figures.comparison;
         if comparison.loses() {
             return Err(FieldFitError::NotCarried(Box::new(comparison)).into());

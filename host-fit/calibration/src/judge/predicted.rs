@@ -83,16 +83,6 @@ impl Predicted {
         }
     }
 
-    /// The same over the noise floor with these variances: m2, m2, rad2.
-    #[must_use]
-    pub fn over(&self, floor: [f64; 3]) -> Self {
-        let ratio = |axis: usize| self.rms[axis] / floor[axis].sqrt();
-        Self {
-            ratio: [0, 1, 2].map(ratio),
-            ..*self
-        }
-    }
-
     /// The ratio of the worst axis.
     pub fn worst_ratio(&self) -> f64 {
         self.ratio.into_iter().fold(0.0, f64::max)

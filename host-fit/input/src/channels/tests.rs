@@ -258,3 +258,23 @@ fn fast_motion_of_the_stage_is_no_filter() {
     }
     assert_eq!(column(&dataset, Channel::BeamX).falls, None);
 }
+
+#[test]
+fn the_floor_has_no_coarse_steps_and_a_noisy_probe_counts_as_the_middle_one() {
+    let floor = |change: fn(i32, usize) -> i32| {
+        let mut dataset = sound();
+        for (k, row) in dataset.rows.iter_mut().enumerate() {
+            row.frame.codes.hall[1] = change(row.frame.codes.hall[1], k);
+        }
+        probe_noise_m(&columns(&dataset, &stage())).map(|m| m / stage().hall.m_per_count)
+    };
+    let own = floor(|code, _| code);
+    assert!(
+        own.iter().all(|codes| (7.5..8.5).contains(codes)),
+        "{own:?}"
+    );
+    let coarse = floor(|code, _| code - code.rem_euclid(20));
+    assert!((coarse[1] / own[1] - 1.0).abs() < 0.08, "{coarse:?}");
+    let noisy = floor(|code, k| code + [60, -60][k % 2]);
+    assert!(own.contains(&noisy[1]), "{noisy:?}");
+}

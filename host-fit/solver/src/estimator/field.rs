@@ -3,7 +3,7 @@
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::error::FieldFitError;
-use super::noise::{USUAL_DRIFT_MM, drift_mm, floor_mm, white_mm, white_only};
+use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
@@ -94,7 +94,9 @@ pub fn fit_field(
     start: &Parameters,
 ) -> Result<FieldFit, FieldFitError> {
     let rows = Rows::new(dataset, selected).into();
-    WhiteFit::new(dataset, rows, stage, start)?.finish(stage)
+    let fit = WhiteFit::new(dataset, rows, stage, start)?;
+    let floor_mm = fit.noise.white_mm;
+    fit.finish(stage, floor_mm)
 }
 
 /// The first phase of a fit: under white noise, each row with its weight.
@@ -202,11 +204,11 @@ impl WhiteFit {
         Ok(fit)
     }
 
-    /// The rest of [`fit_field`]: under the noise that the residuals show.
+    /// The rest of [`fit_field`]: under the noise that the residuals show; `floor_mm` is the noise of the probes in service.
     ///
     /// # Errors
     /// See [`FieldFitError`].
-    pub fn finish(mut self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
+    pub fn finish(mut self, stage: &Stage, floor_mm: [f64; 3]) -> Result<FieldFit, FieldFitError> {
         let mut covariance = self.covariance(&self.normal()?)?;
         // White noise alone makes the errors too small, never too large: what fails here, fails.
         let early = self.comparison(stage, &self.posterior(&covariance, self.noise));
@@ -239,9 +241,9 @@ impl WhiteFit {
         };
         let shows_acceleration = self.shows_acceleration && MotionFit::is_shown_by(&covariance);
         let motion = MotionFit::new(self.at.values.as_slice(), &covariance, shows_acceleration);
-        let floor_mm = floor_mm(&self.rows, self.noise.white_mm, stage);
+        // Residuals show it better where the reference adds nothing.
         let floor = Noise {
-            white_mm: floor_mm,
+            white_mm: [0, 1, 2].map(|k| floor_mm[k].min(self.noise.white_mm[k])),
             ..self.noise
         };
         let (posterior, temperature) = self.with_temperature(covariance, floor);

@@ -3,12 +3,11 @@
 use super::blocks::Block;
 use super::dynamics::Dynamics;
 use super::probe::Probe;
-use super::rows::{FieldRow, Rows};
+use super::rows::Rows;
 use super::whiten::{COLUMNS, Noise, UNKNOWNS, columns};
 use crate::estimator::robust::HALF;
-use crate::statistics::{SecondDifferences, robust_deviation};
+use crate::statistics::SecondDifferences;
 use hallstage_input::stage::Stage;
-use hallstage_input::statistics::median;
 use nalgebra::DMatrix;
 use runtime::matrix::{from_rows, inverse, to_rows};
 
@@ -39,32 +38,6 @@ pub fn white_mm(
         }
     }
     noise.deviations().map(|white| white.max(least_mm))
-}
-
-/// A probe with more than this many times the noise of the middle probe is noisier than its kind: in sound logs a probe has
-/// at most 1.14 times that noise.
-const NOISY: f64 = 1.3;
-
-/// The noise of the probes A, B, C that makes the noise floor in service, mm: from fifth differences of the readings, which
-/// have 252 times the variance of the noise and hardly see motion, so no reference raises the floor. A probe that is
-/// noisier than its kind counts as the middle probe.
-pub fn floor_mm(rows: &Rows, white_mm: [f64; 3], stage: &Stage) -> [f64; 3] {
-    const FIFTH: [f64; 6] = [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0];
-    let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-    let own_mm = [0, 1, 2].map(|probe| {
-        let windows = (rows.movement_rows()).flat_map(|movement| rows.rows[movement].windows(6));
-        let sum = |six: &[FieldRow]| {
-            let terms = six.iter().zip(FIFTH);
-            terms.map(|(row, by)| by * row.signal_mm[probe]).sum()
-        };
-        (robust_deviation(windows.map(sum)) / 252f64.sqrt()).max(least_mm)
-    });
-    let usual_mm = median(&mut own_mm.clone()).unwrap_or(least_mm);
-    let floor = |k: usize| match own_mm[k] > NOISY * usual_mm {
-        true => usual_mm,
-        false => own_mm[k].min(white_mm[k]),
-    };
-    [0, 1, 2].map(floor)
 }
 
 /// Means over a span of about [`SPAN_S`], as poses.
@@ -221,8 +194,6 @@ pub fn white_only(white_mm: [f64; 3]) -> Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::sample_for_tests::{Run, parameters, stage};
-    use hallstage_input::dataset::Dataset;
 
     /// Differences as large as a walk of this size makes them on average.
     fn differences(count: usize, walk: f64) -> Vec<Difference> {
@@ -248,27 +219,5 @@ mod tests {
         let still = mean_walk(&differences(7, 0.0), 1e-4);
         assert!((2e-5..1e-4).contains(&still), "{still}");
         assert!(mean_walk(&[], 1e-4) > 1e-4);
-    }
-
-    #[test]
-    fn the_floor_is_the_noise_of_the_probes_and_a_noisy_probe_counts_as_the_middle_one() {
-        let mut dataset = Run::EIGHT_SECONDS.dataset(&parameters());
-        let floor = |dataset: &Dataset, white_mm| {
-            let all: Vec<usize> = (0..dataset.rows.len()).collect();
-            floor_mm(&Rows::new(dataset, &all), white_mm, &stage())
-        };
-        let own_mm = Run::EIGHT_SECONDS.white_m * 1e3;
-        let sound_mm = floor(&dataset, [1.0; 3]);
-        assert!(
-            sound_mm.iter().all(|mm| (mm / own_mm - 1.0).abs() < 0.1),
-            "{sound_mm:?}"
-        );
-        // Residuals are smaller where the reference has the same noise.
-        let least_mm = [0.1 * own_mm, 1.0, 1.0];
-        assert_eq!(floor(&dataset, least_mm)[0], least_mm[0]);
-        for (k, row) in dataset.rows.iter_mut().enumerate() {
-            row.signal_m[1] += if k % 2 == 0 { 3e-6 } else { -3e-6 };
-        }
-        assert!(sound_mm.contains(&floor(&dataset, [1.0; 3])[1]));
     }
 }

@@ -6,7 +6,6 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::dynamics::{Dynamics, PER_ACCELERATION};
-use hallstage_solver::estimator::noise::floor_mm;
 use hallstage_solver::estimator::parameters::{FieldParameters, HELD};
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::Rows;
@@ -26,8 +25,6 @@ pub(super) struct Means {
     pub(super) first: Vec<usize>,
     /// White noise of A, B, C from row to row, mm.
     pub(super) white_mm: [f64; 3],
-    /// The noise of the probes that makes the noise floor, mm.
-    pub(super) floor_mm: [f64; 3],
     /// Errors of the resets, mm, mm, mrad, where they are declared.
     pub(super) resets_mm: Option<[f64; 3]>,
     /// Prior standard deviation of what acceleration adds to the readings, mm per m/s2.
@@ -62,7 +59,6 @@ impl Means {
         };
         let movements: Vec<Range<usize>> = rows.movement_rows().collect();
         let white_mm = white(&movements);
-        let floor_mm = floor_mm(&rows, white_mm, stage);
         // Rows far from the middle of their block, as beside a step, have no weight.
         for block in rows.blocks.clone() {
             for (k, white_mm) in white_mm.into_iter().enumerate() {
@@ -91,7 +87,6 @@ impl Means {
             rows,
             first,
             white_mm,
-            floor_mm,
             resets_mm: stage.resets_mm(),
             acceleration: if shows_acceleration {
                 PER_ACCELERATION
