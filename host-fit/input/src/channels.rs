@@ -51,8 +51,6 @@ pub struct Column {
     pub white_noise_m: Option<f64>,
     /// Noise over the median of its kind.
     pub to_siblings: Option<f64>,
-    /// Noise of the noisiest second over the median of all seconds.
-    pub noise_change: f64,
     /// Falls of its noise from 20 to 75 Hz and from 75 to 200 Hz, over the falls of a random walk; `None` for rates
     /// below 480 rows a second. White noise has 0.08 and 0.21, drift of an interferometer up to one.
     pub falls: Option<[f64; 2]>,
@@ -126,7 +124,7 @@ fn compare(columns: &mut [Column]) {
 impl Column {
     fn new(log: usize, signal: &Signal, period_s: f64) -> Self {
         let step = codes::step(signal);
-        let (noise, change) = noise::white(signal).unzip();
+        let noise = noise::white(signal);
         let is_beam = signal.channel.is_beam();
         let values = || signal.values.iter().copied();
         let range = [
@@ -141,7 +139,6 @@ impl Column {
             step_m: step * signal.unit_m,
             white_noise_m: noise.map(|noise| noise * signal.unit_m),
             to_siblings: None,
-            noise_change: change.unwrap_or(1.0),
             falls: spectrum::falls(signal, step, period_s),
             slow: rate::slow(signal, step),
             straight: None,

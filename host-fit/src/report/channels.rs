@@ -18,7 +18,6 @@ pub fn channels(columns: &[Column], dataset: &Dataset) -> Vec<Group> {
             "step" => um(column.step_m),
             "noise" => column.white_noise_m.map(um),
             "to_siblings" => column.to_siblings.map(ratio),
-            "noise_change" => ratio(column.noise_change),
             "falls" => column.falls.map(|falls| Figure::from_iter(falls.map(ratio))),
             "rows_per_value" => column.slow.map(|slow| slow.every),
             "rows_between" => column.slow.map(|slow| between(slow.is_held)),

@@ -16,17 +16,13 @@ pub(super) fn fifth_differences(run: &[f64]) -> impl Iterator<Item = f64> {
         .map(|v| (v[5] - v[0]) - 5.0 * (v[4] - v[1]) + 10.0 * (v[3] - v[2]))
 }
 
-/// The standard deviation of the white noise, in the unit of the values: the median of blocks. And the noisiest block
-/// over it.
-pub(super) fn white(signal: &Signal) -> Option<(f64, f64)> {
+/// The standard deviation of the white noise, in the unit of the values: the median of blocks.
+pub(super) fn white(signal: &Signal) -> Option<f64> {
     let differences = signal.runs().flat_map(fifth_differences).map(f64::abs);
     let mut differences: Vec<f64> = differences.collect();
     // A short rest at the end has no block of its own.
     let rows = BLOCK.min(differences.len()).max(1);
     let blocks = differences.chunks_exact_mut(rows);
     let mut levels: Vec<f64> = blocks.filter_map(median).collect();
-    let most = levels.iter().copied().fold(0.0, f64::max);
-    let level = median(&mut levels)?;
-    let change = if level > 0.0 { most / level } else { 1.0 };
-    Some((NORMAL * level / POWER.sqrt(), change))
+    Some(NORMAL * median(&mut levels)? / POWER.sqrt())
 }

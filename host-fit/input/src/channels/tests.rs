@@ -51,7 +51,6 @@ fn a_sound_log_has_the_noise_of_its_sensors_and_no_fault() {
         assert!((column.to_siblings.expect("three") - 1.0).abs() < 0.1);
         let [low, high] = column.falls.expect("500 rows a second");
         assert!(low < 1.0 && high < 0.45, "{low} {high}");
-        assert!((column.noise_change - 1.15).abs() < 0.15);
         assert_eq!(
             (column.slow, &column.straight, column.overflows),
             (None, &None, None)
@@ -199,10 +198,7 @@ fn noise_is_compared_with_siblings_and_over_time() {
     let ratio = noisy(0).to_siblings.expect("three");
     assert!((3.0..5.5).contains(&ratio), "{ratio}");
     let late = noisy(14_000);
-    assert!(
-        late.noise_change > 3.0 && late.to_siblings < Some(1.2),
-        "{late:?}"
-    );
+    assert!(late.to_siblings < Some(1.2), "{late:?}");
 }
 
 #[test]
