@@ -97,12 +97,12 @@ pub(super) fn errors_per_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Gr
 /// The errors of rows by whole degrees of mount and body; empty where the log has no temperatures.
 pub(super) fn errors_per_degree(dataset: &Dataset, by_row: &RowErrors) -> Vec<Group> {
     let mut degrees: BTreeMap<(usize, i32), ErrorSums> = BTreeMap::new();
-    for (index, (row, error)) in dataset.rows.iter().zip(by_row).enumerate() {
+    for (row, error) in dataset.rows.iter().zip(by_row) {
         for (sensor, read_mc) in row.frame.temperature_mc().into_iter().enumerate() {
             if read_mc != MISSING_CODE {
                 let degree = read_mc.div_euclid(1000);
                 let sums = degrees.entry((sensor, degree)).or_insert(ErrorSums::NONE);
-                sums.take(index, *error);
+                sums.take(*error);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Findings about the fit itself.
 
-use super::limits::{ERROR_TO_NOISE_MAX, severity_of_share};
+use super::limits::severity_of_share;
 use crate::fit::Fit;
 use crate::judge::identify::{FitFailure, check_described};
 use crate::judge::predicted::Predicted;
@@ -52,22 +52,14 @@ pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Fi
     (severity > Severity::Note).then(|| Finding::new(kind).with_severity(severity))
 }
 
-/// The reason for another model than the field model, with its errors in service. A warning where its errors are far
-/// above their noise, `unexplained` by other findings.
-pub(super) fn not_field(
-    fit: &Fit,
-    predicted: Option<&Predicted>,
-    unexplained: Option<f64>,
-) -> Option<Finding> {
-    let over_noise = unexplained.filter(|ratio| *ratio > ERROR_TO_NOISE_MAX);
-    let severity = over_noise.map_or(Severity::Note, |_| Severity::Warn);
+/// The reason for another model than the field model, with its errors in service.
+pub(super) fn not_field(fit: &Fit, predicted: Option<&Predicted>) -> Option<Finding> {
     let kind = Kind::OtherModel {
         reason: words::model_reason(fit),
         in_service_micro: predicted
             .map(|predicted| predicted.range.map(|ends| ends.map(|end| end * 1e6))),
-        over_noise,
     };
-    let found = Finding::new(kind).with_severity(severity);
+    let found = Finding::new(kind).with_severity(Severity::Note);
     (fit.model.kind != ModelKind::Field).then_some(found)
 }
 

@@ -229,10 +229,6 @@ impl Described {
     }
 }
 
-fn are_notes(findings: &[Finding]) -> bool {
-    findings.iter().all(|f| f.severity == Severity::Note)
-}
-
 /// Whether the rows of a finding are left out of a repair.
 const fn stands(found: &Finding) -> bool {
     matches!(found.code(), Code::Stuck | Code::Saturated)
@@ -308,12 +304,7 @@ impl Diagnosis {
         };
         if !findings.iter().any(explains) {
             findings.extend(fit_checks::undescribed(fit, dataset, stage));
-            let unexplained = are_notes(findings).then(|| fit_checks::over_noise(fit, dataset));
-            findings.extend(fit_checks::not_field(
-                fit,
-                self.predicted.as_ref(),
-                unexplained,
-            ));
+            findings.extend(fit_checks::not_field(fit, self.predicted.as_ref()));
         }
     }
 

@@ -1,9 +1,7 @@
 //! What a user should know of a fit that is good nevertheless.
 
 use super::Fit;
-use crate::judge::Judgement;
 use crate::judge::predicted::Predicted;
-use crate::judge::statistics::AxisError;
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
@@ -21,8 +19,6 @@ const LAG_MIN: f64 = 0.1;
 const LAG_ERRORS_MIN: f64 = 3.0;
 /// A sensitivity farther beyond its range, in parts of the range, may be a wrong scale.
 const SCALE_PART: f64 = 0.05;
-/// In a million rows of noise alone the largest error is five times the rms.
-const PEAK_TO_RMS_MAX: f64 = 8.0;
 
 /// Zero deviations beyond their range, and rows that the decoder refuses.
 pub fn counted(zeros: &[ZeroDeviation], undecoded: usize) -> impl Iterator<Item = Finding> {
@@ -119,14 +115,6 @@ impl Fit {
             let found = Finding::new(kind).with_channel(Channel::SINGLE[id.probe]);
             warnings.push(found.with_severity(severity(is_scale(id))));
         }
-        let vertical = at_limit.iter().filter(|id| id.is_slope()).count();
-        if vertical > 1 {
-            let kind = Kind::VerticalAtLimit {
-                parameters: vertical,
-            };
-            warnings.push(Finding::new(kind).with_severity(severity(false)));
-        }
-        warnings.extend(wild_row(dataset, &self.judgement));
         if self.model.has_zero_deviation {
             warnings.extend(missed(dataset, &self.fitted.numbers));
         }
@@ -148,26 +136,4 @@ fn missed(dataset: &Dataset, selected: &[usize]) -> Option<Finding> {
     let missed = all.filter(|(present, _)| !**present);
     let movements: Vec<String> = missed.map(|(_, of)| dataset.movement_name(of)).collect();
     (!movements.is_empty()).then(|| Finding::new(Kind::MovementsMissed { movements }))
-}
-
-/// The row with the largest error in terms of the rms of its axis, if that is too large for noise.
-fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<Finding> {
-    let axes = Channel::POSE.into_iter().zip(judgement.errors.axes);
-    let ratio = |e: &AxisError| e.peak / e.rms.max(f64::MIN_POSITIVE);
-    let (axis, error) = axes.max_by(|(_, a), (_, b)| ratio(a).total_cmp(&ratio(b)))?;
-    if error.peak <= PEAK_TO_RMS_MAX * error.rms {
-        return None;
-    }
-    let row = dataset.rows.get(error.peak_row)?;
-    let movement = dataset.movement_name(dataset.movements.get(row.movement)?);
-    let kind = Kind::WildRow {
-        micro: error.peak * 1e6,
-        unit: axis.micro_unit(),
-        ratio: error.peak / error.rms,
-    };
-    Some(
-        Finding::new(kind)
-            .with_channel(axis)
-            .with_place(movement, row.t_us),
-    )
 }

@@ -104,11 +104,10 @@ impl<'s> Judge<'s> {
                 vertical: [0.0; 3],
             });
         }
-        let row_number = self.rows;
         self.rows += 1;
         if let Some(last) = self.movements.last_mut() {
             last.movement.rows.end = self.rows;
-            last.sums.take(row_number, error);
+            last.sums.take(error);
             for (sum, x) in last.vertical.iter_mut().zip(row.vertical) {
                 *sum += x;
             }

@@ -159,7 +159,7 @@ impl Decoded {
             let mut sums = ErrorSums::NONE;
             errors[..rest]
                 .iter_mut()
-                .for_each(|error| sums.take(0, error.take()));
+                .for_each(|error| sums.take(error.take()));
             let zero = sums.mean().unwrap_or([f64::NAN; 3]);
             for error in errors.iter_mut().flatten() {
                 (0..3).for_each(|axis| error[axis] -= zero[axis]);

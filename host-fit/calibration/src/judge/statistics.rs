@@ -10,8 +10,6 @@ pub struct AxisError {
     pub rms: f64,
     /// Largest magnitude, m or rad.
     pub peak: f64,
-    /// The row of the peak.
-    pub peak_row: usize,
 }
 
 /// Errors of X, Y, Rz.
@@ -32,9 +30,8 @@ pub struct ErrorSums {
     pub undecoded: usize,
     error: [f64; 3],
     squares: [f64; 3],
-    /// The lowest and the highest error, and their rows.
-    low: [(f64, usize); 3],
-    high: [(f64, usize); 3],
+    low: [f64; 3],
+    high: [f64; 3],
 }
 
 impl ErrorSums {
@@ -44,12 +41,12 @@ impl ErrorSums {
         undecoded: 0,
         error: [0.0; 3],
         squares: [0.0; 3],
-        low: [(f64::INFINITY, 0); 3],
-        high: [(f64::NEG_INFINITY, 0); 3],
+        low: [f64::INFINITY; 3],
+        high: [f64::NEG_INFINITY; 3],
     };
 
-    /// Takes the error of the next row; `row` is its number.
-    pub fn take(&mut self, row: usize, error: Option<[f64; 3]>) {
+    /// Takes the error of the next row.
+    pub fn take(&mut self, error: Option<[f64; 3]>) {
         let Some(error) = error else {
             self.undecoded += 1;
             return;
@@ -58,12 +55,8 @@ impl ErrorSums {
         for (axis, error) in error.into_iter().enumerate() {
             self.error[axis] += error;
             self.squares[axis] += error * error;
-            if error < self.low[axis].0 {
-                self.low[axis] = (error, row);
-            }
-            if error > self.high[axis].0 {
-                self.high[axis] = (error, row);
-            }
+            self.low[axis] = self.low[axis].min(error);
+            self.high[axis] = self.high[axis].max(error);
         }
     }
 
@@ -74,12 +67,8 @@ impl ErrorSums {
         for axis in 0..3 {
             self.error[axis] += more.error[axis];
             self.squares[axis] += more.squares[axis];
-            if more.low[axis].0 < self.low[axis].0 {
-                self.low[axis] = more.low[axis];
-            }
-            if more.high[axis].0 > self.high[axis].0 {
-                self.high[axis] = more.high[axis];
-            }
+            self.low[axis] = self.low[axis].min(more.low[axis]);
+            self.high[axis] = self.high[axis].max(more.high[axis]);
         }
     }
 
@@ -96,25 +85,17 @@ impl ErrorSums {
             let squares = self.squares[axis] - 2.0 * zero * self.error[axis];
             less.squares[axis] = (squares + rows * zero * zero).max(0.0);
             less.error[axis] -= rows * zero;
-            less.low[axis].0 -= zero;
-            less.high[axis].0 -= zero;
+            less.low[axis] -= zero;
+            less.high[axis] -= zero;
         }
         less
     }
 
     /// The figures; all zero without rows.
     pub fn errors(&self) -> PoseError {
-        let axis = |axis: usize| {
-            let ((low, low_row), (high, high_row)) = (self.low[axis], self.high[axis]);
-            let (peak, peak_row) = match high >= -low {
-                true => (high, high_row),
-                false => (-low, low_row),
-            };
-            AxisError {
-                rms: (self.squares[axis] / self.rows.max(1) as f64).sqrt(),
-                peak: peak.max(0.0),
-                peak_row,
-            }
+        let axis = |axis: usize| AxisError {
+            rms: (self.squares[axis] / self.rows.max(1) as f64).sqrt(),
+            peak: self.high[axis].max(-self.low[axis]).max(0.0),
         };
         PoseError {
             axes: [0, 1, 2].map(axis),
@@ -148,7 +129,7 @@ pub fn white_noise(errors: &[Option<[f64; 3]>], movements: &[Movement]) -> [f64;
 /// rms of errors of X, Y, Rz over their noise from row to row within the movements.
 pub fn over_noise(errors: &[Option<[f64; 3]>], movements: &[Movement]) -> [f64; 3] {
     let mut sums = ErrorSums::NONE;
-    (errors.iter().enumerate()).for_each(|(row, error)| sums.take(row, *error));
+    errors.iter().for_each(|error| sums.take(*error));
     let (axes, noise) = (sums.errors().axes, white_noise(errors, movements));
     [0, 1, 2].map(|axis| axes[axis].rms / noise[axis])
 }
@@ -160,14 +141,13 @@ mod tests {
     #[test]
     fn rms_and_peak_of_errors_worked_by_hand() {
         let mut sums = ErrorSums::NONE;
-        sums.take(4, Some([3e-6, -1e-6, 0.0]));
-        sums.take(5, None);
-        sums.take(7, Some([-4e-6, 1e-6, 6e-6]));
+        sums.take(Some([3e-6, -1e-6, 0.0]));
+        sums.take(None);
+        sums.take(Some([-4e-6, 1e-6, 6e-6]));
         assert_eq!((sums.rows, sums.undecoded), (2, 1));
         let error = sums.errors();
         assert!((error.axes[0].rms - 12.5e-12f64.sqrt()).abs() < 1e-18);
         assert_eq!(error.axes[0].peak, 4e-6);
-        assert_eq!(error.axes.map(|a| a.peak_row), [7, 7, 7]);
         assert!((error.axes[1].rms - 1e-6).abs() < 1e-18);
         assert_eq!(error.axes[2].peak, 6e-6);
         // (12.5 + 1 + 18) / 3

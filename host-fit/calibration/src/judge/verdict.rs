@@ -146,14 +146,11 @@ fn hides(cause: &Finding, found: &Finding) -> bool {
     if !cause.code().entry().hides.contains(&found.code()) {
         return false;
     }
-    let is_pose = |of: &Finding| of.channels().iter().any(|channel| channel.is_pose());
     let is_same_movement = cause.movement() == found.movement();
     match found.code() {
         // Movements that reach the end of a converter's range look like movements of another stage.
         Code::LogsDisagree => found.place.is_some(),
         _ if found.severity > cause.severity => false,
-        // Rows of a channel explain a wild row of the pose.
-        Code::Outliers => is_pose(found) && !is_pose(cause),
         // Where a channel stops and goes on, others seem to jump.
         Code::Step => is_same_movement && found.channels() != cause.channels(),
         Code::ZeroClipped => cause.place.is_none() || is_same_movement,
@@ -187,21 +184,20 @@ mod tests {
     #[test]
     fn a_cause_stays_and_its_consequences_go() {
         let step = change(Quantity::Zero, TimeCourse::Onset, Channel::BeamY1);
-        let wild = Finding::new(Kind::WildRow {
-            micro: 1.0,
-            unit: "urad",
-            ratio: 9.0,
+        let clipped = Finding::new(Kind::ZerosClipped {
+            movements: 1,
+            of: 2,
+            largest_um: 9.0,
         });
-        let wild = wild.with_channel(Channel::Rz);
         let rows = Finding::new(Kind::OutlierRows {
             rows: 1,
             largest_um: 10.0,
         });
         let rows = rows.with_channel(Channel::HallA);
         let lag = change(Quantity::Time, TimeCourse::Constant, Channel::Beams);
-        let all = vec![step.clone(), wild.clone(), rows.clone(), lag.clone()];
+        let all = vec![step.clone(), clipped.clone(), rows.clone(), lag.clone()];
         assert_eq!(ranked(all), [step, rows, lag.clone()]);
-        let alone = vec![wild];
+        let alone = vec![clipped];
         assert_eq!(ranked(alone.clone()), alone);
         let hum = Finding::new(Kind::Hum {
             frequency_hz: 50.0,
@@ -224,9 +220,9 @@ mod tests {
         });
         let (other, lacks) = (
             refused(Kind::OtherState { log: None }),
-            refused(Kind::ChangesOften {}),
+            refused(Kind::NotLinear {}),
         );
-        let limits = Finding::new(Kind::VerticalAtLimit { parameters: 2 });
+        let limits = Finding::new(Kind::OtherProbes { tolerances: 9.0 });
         let all = vec![swapped.clone(), limits, other.clone(), lacks.clone()];
         assert_eq!(ranked(all), [swapped, other]);
         assert_eq!(ranked(vec![lacks.clone()]), [lacks]);
@@ -256,7 +252,7 @@ mod tests {
             verdict(vec![late(Channel::HallB)], fit),
             Some(Verdict::Limited)
         );
-        let limits = || Finding::new(Kind::VerticalAtLimit { parameters: 2 });
+        let limits = || Finding::new(Kind::OtherProbes { tolerances: 9.0 });
         assert_eq!(verdict(vec![limits()], fit), Some(Verdict::Limited));
         let costly = || {
             late(Channel::BeamX)

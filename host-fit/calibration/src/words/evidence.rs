@@ -45,8 +45,8 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::OtherUnit { what, ratio, units } => format!("{what} are {ratio} times what stage.toml expects, as where {units}"),
         Kind::IdleMovements { movements, of } => format!("nothing moves in {movements} of {}, and rows without motion show nothing", counted(*of, "movement")),
-        Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => format!("{on} never changes"),
-        Kind::Stands { rows, percent, longest_s } | Kind::StandsAtEnd { rows, percent, longest_s } => {
+        Kind::Stands { percent: 100.0, .. } => format!("{on} never changes"),
+        Kind::Stands { rows, percent, longest_s, .. } => {
             format!("{on} stands still in {} ({percent:.1} % of the log), for up to {longest_s:.3} s at a time", counted(*rows, "row"))
         }
         Kind::OutlierRows { rows, largest_um } => {
@@ -73,9 +73,6 @@ pub(super) fn evidence(found: &Finding) -> String {
             let what = log.as_deref().unwrap_or("the log from here on");
             format!("{what} does not fit to what comes before: two stages, or everything changed{}", cost(found))
         }
-        Kind::ChangesOften {} => {
-            format!("{on} changes more than twice. Its course between the changes is unknown, so the calibration is not free of it")
-        }
         Kind::NotLinear {} => {
             let titles: Vec<&str> = found.channels.iter().map(|channel| channel.title()).collect();
             format!("the signal of {} does not follow the motion of the reference, in this log or in a part of it, and no order, sign or scale explains it", titles.join(" and "))
@@ -101,15 +98,12 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::ShortMovements { mean_rows, hidden_percent } => {
             format!("the movements have {mean_rows:.1} rows on average. Each has a zero deviation of its own, which hides about {hidden_percent:.0} % of the errors")
         }
-        Kind::OtherModel { reason, in_service_micro, over_noise } => {
+        Kind::OtherModel { reason, in_service_micro } => {
             let service = in_service_micro.map_or(String::new(), |ranges| {
                 let [x, y, rz] = ranges.map(|[low, high]| format!("{low:.1} to {high:.1}"));
                 format!(". Expect the errors of the log for similar movements; in service expect {x} µm in X, {y} µm in Y, {rz} µrad in Rz")
             });
-            let noise = over_noise.map_or(String::new(), |ratio| {
-                format!(". Its errors are {ratio:.1} times the noise from row to row: the log shows something that the model lacks")
-            });
-            format!("{reason}{service}{noise}")
+            format!("{reason}{service}")
         }
         Kind::PoorFit { over_noise, best } => {
             format!("the search ended far from the best fit: its errors are {over_noise:.1} times the noise from row to row, the errors of least squares {best:.1} times")
@@ -129,11 +123,9 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::AtLimit { parameter, shown: (value, unit), .. } => {
             format!("the parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})")
         }
-        Kind::VerticalAtLimit { parameters } => format!("{parameters} of the vertical terms stand at an end of their ranges"),
         Kind::MovementsMissed { movements } => {
             format!("the draw has no row of {} ({}), so their zero deviations are not fitted, and zero is taken", counted(movements.len(), "movement"), listed(movements))
         }
-        Kind::WildRow { micro, unit, ratio } => format!("the largest error, {micro:.1} {} in {on}, is {ratio:.0} times the rms", sign(unit)),
         Kind::OtherMotion { micro, service_micro, unit, .. } => {
             let unit = sign(unit);
             format!("the log moves {on} by {micro:.0} {unit} to either side, service by {service_micro:.0} {unit} ([motion] in stage.toml)")

@@ -47,7 +47,7 @@ fn source(found: &Finding) -> String {
 #[rustfmt::skip]
 pub fn remedy(found: &Finding) -> String {
     let remedy = match &found.kind {
-        Kind::Excerpt { .. } | Kind::CodesRefused { .. } | Kind::OtherModel { over_noise: None, .. } => "",
+        Kind::Excerpt { .. } | Kind::CodesRefused { .. } | Kind::OtherModel { .. } => "",
         Kind::Coefficients { deviations: None, span_k, is_field, .. } if *span_k > 0.0 || !is_field => "",
         Kind::Coefficients { deviations: Some(_), sensor, .. } => {
             return format!("check the sensor, its column, unit and sign, and `{}`", SENSORS[*sensor].2);
@@ -61,21 +61,17 @@ pub fn remedy(found: &Finding) -> String {
         Kind::SingleRows { .. } => "check the movement column",
         Kind::RowsMissing { .. } => "look for frames that the recorder lost",
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",
-        Kind::Stands { percent: 100.0, .. } | Kind::StandsAtEnd { percent: 100.0, .. } => "is it connected?",
-        Kind::ChangesOften {} => "let it warm up, look for loose contacts, and record the log again",
+        Kind::Stands { percent: 100.0, .. } => "is it connected?",
         Kind::NotLinear {} => "look at its codes, and fit the logs one by one",
         Kind::Inconsistent { .. } => "check that channel and the reference, and record the log again",
         Kind::FaultsTogether { .. } => "see the other findings, and record the log again",
         Kind::OtherProbes { .. } => "check order and signs of all channels, the scales and the designed values in stage.toml",
         Kind::ShortMovements { .. } => "check the times and the movement column; a log without this column begins a movement after every gap of more than ten rows",
-        Kind::OtherModel { .. } => "if all six axes move at once, take --model field or auto; else see the errors over the log in the report",
         Kind::PoorFit { .. } => "let the search run longer, or take the default solver",
         Kind::NotDescribed { .. } => "check the columns, the order and signs of the sensors, and the scales in stage.toml",
         Kind::LateReference { .. } => "find out which is late, and set its delay to zero",
         Kind::AtLimit { .. } => "check the scales and signs of that probe and of the beams; if they are right, widen the range in stage.toml",
-        Kind::VerticalAtLimit { .. } => "check the order and the signs of the capacitive sensors in the log and in stage.toml",
         Kind::MovementsMissed { .. } => "use --draw stratified, or a larger --train",
-        Kind::WildRow { .. } => "if the row is wrong, take it out of the log and fit again",
         Kind::OtherUnit { .. } => "check the unit of the column in the log and in stage.toml",
         Kind::TemperaturesExchanged { .. } => "check `mount` and `body` in [temperature], and the sensors",
         Kind::OtherMotion { is_scale: true, .. } => "check units and scales, because nothing else shows a wrong scale of all channels of a kind; or declare the motion",
@@ -125,10 +121,11 @@ mod tests {
             message(&gain),
             "The gain of all Hall probes or all beams changes by -1.00 %. The log does not show which. Alone it makes errors in service of 5.00 times the noise floor. See movement 3 at t_us = 7. The calibration is free of this fault and describes the stage at the end of the log: zero the stage before use. Let the channel warm up, and check its supply."
         );
-        let stands = Kind::StandsAtEnd {
+        let stands = Kind::Stands {
             rows: 5,
             percent: 100.0,
             longest_s: 1.0,
+            is_end: true,
         };
         let stands = Finding::new(stands).with_channel(Channel::Gap2);
         assert_eq!(

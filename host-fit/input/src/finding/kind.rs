@@ -152,10 +152,8 @@ kinds! {
     OtherUnit { what: &'static str, ratio: f64, units: &'static str } => Code::ScaleWrong, *ratio, "";
     /// Movements without motion.
     IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
-    /// A channel repeats a value, or shows its noise alone, while it should move.
-    Stands { rows: usize, percent: f64, longest_s: f64 } => Code::Stuck, *longest_s, "s";
-    /// The same at the largest or the smallest value of the channel.
-    StandsAtEnd { rows: usize, percent: f64, longest_s: f64 } => Code::Saturated, *rows as f64, "rows";
+    /// A channel repeats a value, which may be its largest or its smallest, or shows its noise alone, while it should move.
+    Stands { rows: usize, percent: f64, longest_s: f64, is_end: bool } => if *is_end { Code::Saturated } else { Code::Stuck }, if *is_end { *rows as f64 } else { *longest_s }, if *is_end { "rows" } else { "s" };
     /// Rows of a channel far from the rows before and behind.
     OutlierRows { rows: usize, largest_um: f64 } => Code::Outliers, *rows as f64, "rows";
     /// A line in the spectrum of a channel.
@@ -182,8 +180,6 @@ kinds! {
     Change { quantity: Quantity, course: TimeCourse, size: f64 } => code_of_change(*quantity, course), *size, quantity.unit();
     /// From here on other parameters describe the log.
     OtherState { log: Option<String> } => Code::LogsDisagree;
-    /// A channel changes more often than can be repaired.
-    ChangesOften {} => Code::ModelLacks;
     /// The Hall residuals over their noise, where no fault explains them.
     Inconsistent { ratio: f64 } => Code::ModelLacks, *ratio, "times";
     /// Predicted errors of X, Y, Rz in service over the noise floor, because the log does not determine the parameters.
@@ -202,9 +198,8 @@ kinds! {
     LeftOut { rows: usize, of: usize, percent: f64, end: Place } => Code::LeftOut, *rows as f64, "rows";
     /// Rows of a movement on average, and the part of the errors that its zero deviation hides.
     ShortMovements { mean_rows: f64, hidden_percent: f64 } => Code::ShortMovements, *mean_rows, "rows";
-    /// The model is not the field model. Ranges of the errors in service of X, Y, Rz; errors over their noise
-    /// where nothing explains them.
-    OtherModel { reason: String, in_service_micro: Option<[[f64; 2]; 3]>, over_noise: Option<f64> } => Code::ModelLacks;
+    /// The model is not the field model. Ranges of the errors in service of X, Y, Rz.
+    OtherModel { reason: String, in_service_micro: Option<[[f64; 2]; 3]> } => Code::ModelLacks;
     /// A search ended far from the best description of the log; errors over their noise from row to row.
     PoorFit { over_noise: f64, best: f64 } => Code::ModelLacks, *over_noise, "times";
     /// The model does not describe the motion; rms of the errors and of the motion along an axis.
@@ -217,12 +212,8 @@ kinds! {
     LateReference { lag_us: f64, periods: f64 } => Code::ReferenceLag, *lag_us, "us";
     /// A parameter stands at an end of its search range: its value as reports show it, and in SI.
     AtLimit { parameter: String, shown: (f64, &'static str), value: f64, unit: &'static str } => Code::TermsAtLimit, *value, *unit;
-    /// Number of vertical terms at an end of their search range.
-    VerticalAtLimit { parameters: usize } => Code::TermsAtLimit, *parameters as f64, "";
     /// Movements without a row in a draw.
     MovementsMissed { movements: Vec<String> } => Code::RowsMissing, movements.len() as f64, "movements";
-    /// The largest error, too large for noise.
-    WildRow { micro: f64, unit: &'static str, ratio: f64 } => Code::Outliers, *micro, *unit;
 
     // Of the range and the temperature.
     /// An axis moves otherwise than `[motion]` declares, to either side.

@@ -5,8 +5,7 @@ use super::effects::Shape;
 use super::score::Fault;
 use crate::judge::predicted::Predicted;
 use crate::judge::verdict::severity;
-use hallstage_input::channel::Channel;
-use hallstage_input::finding::{Finding, Kind, Severity, TimeCourse};
+use hallstage_input::finding::{Finding, Kind, TimeCourse};
 
 impl Finder<'_> {
     /// The movement and the time of a mean, and its log if the log begins there.
@@ -59,11 +58,4 @@ impl Finder<'_> {
 pub(super) fn not_determined(predicted: &Predicted) -> Finding {
     let ratios = predicted.ratio;
     Finding::new(Kind::NotDetermined { ratios }).with_cost(predicted.worst_ratio())
-}
-
-/// A channel has more faults than are repaired.
-pub(super) fn changes_often(channel: Channel, cost: f64) -> Finding {
-    let severity = severity(cost).max(Severity::Warn);
-    let found = Finding::new(Kind::ChangesOften {}).with_severity(severity);
-    found.with_channel(channel).with_cost(cost)
 }

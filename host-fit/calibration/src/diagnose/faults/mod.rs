@@ -32,7 +32,7 @@ use crate::judge::predicted::{Predicted, declared_service};
 use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, severity};
 use effects::{Effects, Shape, Suspect};
 use estimate::Estimate;
-use findings::{changes_often, not_determined};
+use findings::not_determined;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Quantity, Severity};
@@ -317,10 +317,7 @@ impl Finder<'_> {
             }
         }
         let count = |of: Channel| channels.iter().filter(|other| **other == of).count();
-        if let Some(&channel) = channels.iter().find(|of| count(**of) > REPAIRS_MAX) {
-            is_clear = false;
-            findings.push(changes_often(channel, own_cost));
-        }
+        is_clear &= channels.iter().all(|of| count(*of) <= REPAIRS_MAX);
         if let Some((fault, late_ms)) = self.late_beam(lags_s) {
             // The lag is part of all that bent the fit.
             findings.insert(0, self.finding(&fault, late_ms, own_cost));

@@ -102,17 +102,11 @@ pub(super) fn named(
         let is_end = values.iter().all(|&x| x <= value) != values.iter().all(|&x| x >= value);
         let is_flat = channel / 3 != 1 && spread(&values[longest.clone()]) == 0.0;
         let longest_s = longest.len() as f64 * log.period_s;
-        let kind = match is_flat && is_end {
-            true => Kind::StandsAtEnd {
-                rows,
-                percent,
-                longest_s,
-            },
-            false => Kind::Stands {
-                rows,
-                percent,
-                longest_s,
-            },
+        let kind = Kind::Stands {
+            rows,
+            percent,
+            longest_s,
+            is_end: is_flat && is_end,
         };
         let found = log
             .found_at(longest.start, kind)
