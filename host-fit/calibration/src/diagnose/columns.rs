@@ -2,7 +2,7 @@
 
 use super::limits::severity_of_share;
 use super::slopes::Slopes;
-use crate::judge::predicted::service_range;
+use crate::judge::predicted::{declared_service, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, probe_noise_m};
@@ -12,7 +12,8 @@ use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::probe::probes;
-use hallstage_solver::estimator::service::service_poses;
+use hallstage_solver::estimator::service::{Service, service_poses};
+use nalgebra::Vector3;
 
 /// The noise of a probe is white, with 0.21 of the fall of a random walk. A filter is there from this fall.
 const FALL_OF_PROBE: f64 = 0.45;
@@ -53,12 +54,13 @@ impl ColumnFaults {
     ) -> Self {
         let probes_m = probe_noise_m(columns);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
-        let by_channel = variances(stage, parameters);
-        let floor = |axis: usize| {
-            let by_probes = by_channel.iter().zip(probes_m);
-            by_probes.map(|(by, m)| by[axis] * m * m).sum::<f64>()
-        };
-        let floor = [0, 1, 2].map(floor);
+        let probes_mm = probes_m.map(|m| m * 1e3);
+        let service = declared_service(stage, parameters, probes_mm);
+        let service = service.map(|service| {
+            let floor = service.by_signals(probes_mm.map(|mm| mm * mm));
+            (floor, variances(&service, stage, parameters))
+        });
+        let (floor, by_channel) = service.unwrap_or_default();
         let (mut findings, mut added) = (Vec::new(), [0.0; 3]);
         for column in columns {
             let log = &dataset.logs[column.log];
@@ -93,20 +95,20 @@ impl ColumnFaults {
         }
         Self { findings, added }
     }
-
 }
 
 /// By channel, mean over the poses of service: the variances of X, Y, Rz by a variance of the channel; zeros for
 /// beams, which service does not have.
-fn variances(stage: &Stage, parameters: &FieldParameters) -> [[f64; 3]; 9] {
+fn variances(service: &Service, stage: &Stage, parameters: &FieldParameters) -> [[f64; 3]; 9] {
     let slopes = Slopes::new(stage, probes(parameters));
-    let places = service_poses(service_range(stage));
-    let share = 1.0 / places.len() as f64;
+    let share = 1e6 / service.poses.len() as f64;
     let mut sums = [[0.0; 3]; 9];
-    for (planar, vertical) in places {
-        let errors = slopes.of_pose(planar.map(|x| x * 1e3), vertical);
-        for (sums, errors) in sums.iter_mut().zip(errors.into_iter().flatten()) {
-            (0..3).for_each(|axis| sums[axis] += share * errors[axis] * errors[axis]);
+    for ((planar, vertical), pose) in service_poses(service_range(stage)).zip(&service.poses) {
+        let by_channel = slopes.at(planar.map(|x| x * 1e3), vertical);
+        for (sums, signals) in sums.iter_mut().zip(by_channel) {
+            for (sum, by_signal) in sums.iter_mut().zip(&pose.by_signal) {
+                *sum += share * signals.dot(&Vector3::from(*by_signal)).powi(2);
+            }
         }
     }
     sums[3..6].fill([0.0; 3]);

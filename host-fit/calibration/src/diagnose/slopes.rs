@@ -36,19 +36,4 @@ impl Slopes {
             _ => -by_gap.column(channel - 6),
         })
     }
-
-    /// Errors of X, Y, Rz (mm, mm, mrad) by an error of each of [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE)
-    /// in service, mm: the probes and the gaps. `None` where the probes do not determine the pose.
-    pub(super) fn of_pose(
-        &self,
-        planar_mm: [f64; 3],
-        vertical: [f64; 3],
-    ) -> Option<[Vector3<f64>; 9]> {
-        let here = self.probes.map(|probe| probe.read(planar_mm, vertical));
-        let by_signal = Matrix3::from_fn(|k, axis| here[k].by_pose[axis]).try_inverse()?;
-        Some(
-            self.at(planar_mm, vertical)
-                .map(|signals| by_signal * signals),
-        )
-    }
 }

@@ -39,11 +39,12 @@ pub struct PoseUncertainty {
 }
 
 /// How errors become errors of a pose in X, Y, Rz: m, m, rad.
-pub(super) struct PoseErrors {
+#[derive(Clone, Debug)]
+pub struct PoseErrors {
     /// Per error of each parameter.
-    pub(super) by_parameter: [[f64; COUNT]; 3],
+    pub by_parameter: [[f64; COUNT]; 3],
     /// Per mm of error of each probe's signal.
-    pub(super) by_signal: [[f64; 3]; 3],
+    pub by_signal: [[f64; 3]; 3],
 }
 
 impl PoseErrors {

@@ -33,6 +33,8 @@ pub struct ServiceVariance {
 /// The poses of a service: how errors of the parameters and of the signals show there, as means.
 #[derive(Clone, Debug)]
 pub struct Service {
+    /// How errors show at each pose.
+    pub poses: Vec<PoseErrors>,
     /// For X, Y, Rz, the products of the derivatives by two parameters.
     by_parameters: [Vec<[f64; COUNT]>; 3],
     /// For X, Y, Rz, the variance by the noise of the probes.
@@ -51,7 +53,8 @@ impl Service {
     ) -> Option<Self> {
         let probes = probes(parameters);
         let share = 1.0 / poses.len() as f64;
-        let mut sums = Self {
+        let mut service = Self {
+            poses: Vec::with_capacity(poses.len()),
             by_parameters: [0; 3].map(|_| vec![[0.0; COUNT]; COUNT]),
             by_noise: [0.0; 3],
             by_form: [0.0; 3],
@@ -60,18 +63,29 @@ impl Service {
             let errors = PoseErrors::new(&probes, planar, vertical)?;
             for axis in 0..3 {
                 let by = &errors.by_parameter[axis];
-                for (row, x) in sums.by_parameters[axis].iter_mut().zip(by) {
+                for (row, x) in service.by_parameters[axis].iter_mut().zip(by) {
                     for (sum, y) in row.iter_mut().zip(by) {
                         *sum += share * (x * y);
                     }
                 }
-                for (by, white) in errors.by_signal[axis].iter().zip(white_mm) {
-                    sums.by_noise[axis] += share * (by * white) * (by * white);
-                    sums.by_form[axis] += share * (by * FORM_MM) * (by * FORM_MM);
-                }
             }
+            service.poses.push(errors);
         }
-        Some(sums)
+        service.by_noise = service.by_signals(white_mm.map(|mm| mm * mm));
+        service.by_form = service.by_signals([FORM_MM * FORM_MM; 3]);
+        Some(service)
+    }
+
+    /// Variances of X, Y, Rz (m2, m2, rad2) by errors of the signals of A, B, C with these variances, mm2.
+    pub fn by_signals(&self, variances_mm2: [f64; 3]) -> [f64; 3] {
+        let share = 1.0 / self.poses.len() as f64;
+        [0, 1, 2].map(|axis| {
+            let of_pose = |pose: &PoseErrors| {
+                let terms = pose.by_signal[axis].iter().zip(variances_mm2);
+                terms.map(|(by, mm2)| by * by * mm2).sum::<f64>()
+            };
+            share * self.poses.iter().map(of_pose).sum::<f64>()
+        })
     }
 
     /// What to expect of parameters with this covariance.

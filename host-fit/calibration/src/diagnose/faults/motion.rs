@@ -7,9 +7,8 @@ use hallstage_solver::estimator::dynamics::ARMS_M;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::FieldRow;
-use hallstage_solver::estimator::service::service_poses;
-use hallstage_solver::estimator::terms::PER_PROBE;
-use nalgebra::{Matrix3, Vector3};
+use hallstage_solver::estimator::service::{Service, service_poses};
+use nalgebra::Vector3;
 
 /// A turning error changes its sign while the speed of the channel is below this part of its rms speed.
 const KNEE: f64 = 0.05;
@@ -124,55 +123,40 @@ impl<'a> Moving<'a> {
 pub(super) struct AtWork {
     rows: Vec<FieldRow>,
     sensed: Sensed,
-    /// The pose by the signals.
-    poses: Vec<Matrix3<f64>>,
-    /// The signals by the parameters of each probe, mm.
-    by_parameter: Vec<[[f64; PER_PROBE]; 3]>,
 }
 
 impl AtWork {
-    /// `None` where the probes do not determine a pose.
-    pub(super) fn new(stage: &Stage, parameters: &FieldParameters) -> Option<Self> {
+    pub(super) fn new(stage: &Stage, parameters: &FieldParameters) -> Self {
         let rows: Vec<FieldRow> = service_poses(service_range(stage))
             .enumerate()
             .map(|(at, pose)| service_row(stage, at, pose))
             .collect();
-        let probes = probes(parameters);
-        let (mut poses, mut by_parameter) = (Vec::new(), Vec::new());
-        for row in &rows {
-            let read = probes.map(|probe| probe.read(row.reference_mm, row.vertical));
-            let by_pose = Matrix3::from_fn(|probe, axis| read[probe].by_pose[axis]);
-            poses.push(by_pose.try_inverse()?);
-            by_parameter.push(read.map(|read| read.by_parameter));
-        }
-        Some(Self {
-            sensed: Sensed::new(&rows, stage, &probes, 0.0),
+        Self {
+            sensed: Sensed::new(&rows, stage, &probes(parameters), 0.0),
             rows,
-            poses,
-            by_parameter,
-        })
+        }
     }
 
     /// Mean squares of the errors of X, Y, Rz (m2, m2, rad2) by an error of the parameters and by errors of channels that
     /// follow the motion. The stage is zeroed before service.
     pub(super) fn squares(
         &self,
-        stage: &Stage,
+        (stage, declared): (&Stage, &Service),
         parameters: &FieldParameters,
         off: &[f64],
         errors: &[(usize, Follows, f64)],
     ) -> [f64; 3] {
         let moving = Moving::new(&self.rows, &self.sensed, stage, parameters, 0.0);
-        let poses = self.poses.iter().zip(&self.by_parameter).enumerate();
-        let pose_errors = poses.map(|(at, (poses, by))| {
-            let signals = Vector3::from_fn(|probe, _| {
-                let own = &off[probe * PER_PROBE..(probe + 1) * PER_PROBE];
-                -own.iter().zip(by[probe]).map(|(x, by)| x * by).sum::<f64>()
-            });
-            let of_channels = errors
+        let pose_errors = declared.poses.iter().enumerate().map(|(at, pose)| {
+            let signals = errors
                 .iter()
-                .map(|&(channel, follows, size)| moving.signals(at, channel, follows) * size);
-            poses * (signals + of_channels.sum::<Vector3<f64>>())
+                .map(|&(channel, follows, size)| moving.signals(at, channel, follows) * size)
+                .sum::<Vector3<f64>>();
+            Vector3::from_fn(|axis, _| {
+                let by_parameters = pose.by_parameter[axis].iter().zip(off);
+                let by_signals = pose.by_signal[axis].iter().zip(&signals);
+                by_parameters.chain(by_signals).map(|(by, x)| by * x).sum()
+            })
         });
         let (mut sum, mut squares) = (Vector3::zeros(), Vector3::zeros());
         for error in pose_errors {
@@ -181,16 +165,7 @@ impl AtWork {
         }
         let share = 1.0 / self.rows.len() as f64;
         let mean = sum * share;
-        ((squares * share - mean.component_mul(&mean)) * 1e-6).into()
-    }
-
-    /// Variances of X, Y, Rz (m2, m2, rad2) by errors of the signals with these variances, mm2.
-    pub(super) fn variance(&self, of_signals: [f64; 3]) -> [f64; 3] {
-        let share = 1e-6 / self.rows.len() as f64;
-        let sum: Vector3<f64> = (self.poses.iter())
-            .map(|poses| poses.component_mul(poses) * Vector3::from(of_signals) * share)
-            .sum();
-        sum.into()
+        (squares * share - mean.component_mul(&mean)).into()
     }
 }
 

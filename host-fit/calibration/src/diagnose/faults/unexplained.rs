@@ -65,8 +65,8 @@ impl Unexplained {
             let lags_s = std::mem::take(&mut probe_lags_s).into_iter().enumerate();
             sensors.extend(lags_s.map(|(probe, s)| (probe, Follows::OwnSpeed, 1e3 * s)));
         }
-        let at_work = AtWork::new(stage, parameters)?;
-        let slow = at_work.variance(evidence.slow_mm2);
+        let at_work = AtWork::new(stage, parameters);
+        let slow = declared.by_signals(evidence.slow_mm2);
         let [spread, none] = [&evidence.added, &DMatrix::zeros(COUNT, COUNT)]
             .map(|covariance| declared.variance(covariance).systematic);
         let is_form =
@@ -81,7 +81,7 @@ impl Unexplained {
                 .collect();
             let stays = match sensors.is_empty() {
                 true => [0.0; 3],
-                false => at_work.squares(stage, parameters, &bent, &sensors),
+                false => at_work.squares((stage, declared), parameters, &bent, &sensors),
             };
             let (known, bent) = (declared.squares(off), declared.squares(&bent));
             [0, 1, 2].map(|axis| {
