@@ -24,7 +24,7 @@ const FALLS_OF_BEAM: [f64; 2] = [3.0, 1.0];
 /// are held for 5 and 10 rows or interpolated over 5 to 25.
 const BENDS: f64 = 0.75;
 
-/// The noise of a beam is that of its reading, and no motion, below this part of the noise of a probe.
+/// The noise of a beam is the noise of its reading, and no motion, below this part of the noise of a probe.
 const QUIET: f64 = 1.0 / 200.0;
 
 /// The effect of a fault.

@@ -2,22 +2,18 @@
 
 use hallstage_input::finding::{Finding, Kind, Severity};
 
-/// What a ratio is of.
-#[derive(Clone, Copy)]
-enum Of {
-    Times,
-    Temperatures,
-}
-
-/// Values over their design where a unit is read as another.
-const RATIOS: [(Of, f64, &str); 7] = [
-    (Of::Times, 1e-6, "s are read as µs"),
-    (Of::Times, 1e-3, "ms are read as µs"),
-    (Of::Times, 1e3, "ns are read as µs"),
-    (Of::Times, 1e6, "ps are read as µs"),
-    (Of::Temperatures, 1e-3, "°C are read as m°C"),
-    (Of::Temperatures, 1e3, "m°C are read as °C"),
-    (Of::Temperatures, 1.8, "°F are read as °C"),
+/// Times over their design where a unit is read as another.
+const TIMES: [(f64, &str); 4] = [
+    (1e-6, "s are read as µs"),
+    (1e-3, "ms are read as µs"),
+    (1e3, "ns are read as µs"),
+    (1e6, "ps are read as µs"),
+];
+/// The same of temperatures.
+const TEMPERATURES: [(f64, &str); 3] = [
+    (1e-3, "°C are read as m°C"),
+    (1e3, "m°C are read as °C"),
+    (1.8, "°F are read as °C"),
 ];
 /// Clocks differ by less than this part.
 const CLOCK_PART: f64 = 0.02;
@@ -26,15 +22,12 @@ const ROOM_C: f64 = 20.0;
 /// ... a room or a warm stage is within this factor of it.
 const ROOM_FACTOR: f64 = 2.5;
 
-fn found(of: Of, is: impl Fn(f64) -> bool) -> Option<Finding> {
-    let same = |other: &Of| *other as u8 == of as u8;
-    let (_, ratio, units) = RATIOS
-        .into_iter()
-        .find(|(other, ratio, _)| same(other) && is(*ratio))?;
-    let what = match of {
-        Of::Times => "the times",
-        Of::Temperatures => "the temperatures",
-    };
+fn found(
+    what: &'static str,
+    units: &[(f64, &'static str)],
+    is: impl Fn(f64) -> bool,
+) -> Option<Finding> {
+    let &(ratio, units) = units.iter().find(|(ratio, _)| is(*ratio))?;
     let kind = Kind::OtherUnit { what, ratio, units };
     Some(Finding::new(kind).with_severity(Severity::Refuse))
 }
@@ -42,15 +35,15 @@ fn found(of: Of, is: impl Fn(f64) -> bool) -> Option<Finding> {
 /// Times between rows that are this many servo periods. A log may be thinned to one of 2, 5 or 100 rows, but not of
 /// 1000.
 pub(super) fn of_times(periods: f64) -> Option<Finding> {
-    found(Of::Times, |ratio| {
+    found("the times", &TIMES, |ratio| {
         (periods / ratio - 1.0).abs() < CLOCK_PART
     })
 }
 
-/// A mean temperature as it is read, degC, and where the log determines it the mean k over its expected value.
+/// A mean temperature as read, degC, and where the log determines it the mean k over its expected value.
 pub(super) fn of_temperature(mean_c: f64, k_part: Option<f64>) -> Option<Finding> {
     let is_room = |c: f64| (ROOM_C / ROOM_FACTOR..ROOM_C * ROOM_FACTOR).contains(&c);
-    found(Of::Temperatures, |ratio| match ratio {
+    found("the temperatures", &TEMPERATURES, |ratio| match ratio {
         _ if is_room(mean_c) => false,
         // degF have another zero. A field that falls per degF falls by 5/9 as much.
         1.8 => {
