@@ -7,8 +7,6 @@ use crate::statistics::median;
 const NORMAL: f64 = 1.4826;
 /// Variance of the fifth differences of white noise of variance one.
 const POWER: f64 = 252.0;
-/// Rows of a block: a second.
-const BLOCK: usize = 500;
 
 /// Fifth differences of a run.
 pub(super) fn fifth_differences(run: &[f64]) -> impl Iterator<Item = f64> {
@@ -16,13 +14,9 @@ pub(super) fn fifth_differences(run: &[f64]) -> impl Iterator<Item = f64> {
         .map(|v| (v[5] - v[0]) - 5.0 * (v[4] - v[1]) + 10.0 * (v[3] - v[2]))
 }
 
-/// The standard deviation of the white noise, in the unit of the values: the median of blocks.
+/// The standard deviation of the white noise, in the unit of the values.
 pub(super) fn white(signal: &Signal) -> Option<f64> {
     let differences = signal.runs().flat_map(fifth_differences).map(f64::abs);
-    let mut differences: Vec<f64> = differences.collect();
-    // A short rest at the end has no block of its own.
-    let rows = BLOCK.min(differences.len()).max(1);
-    let blocks = differences.chunks_exact_mut(rows);
-    let mut levels: Vec<f64> = blocks.filter_map(median).collect();
-    Some(NORMAL * median(&mut levels)? / POWER.sqrt())
+    let middle = median(&mut differences.collect::<Vec<f64>>())?;
+    Some(NORMAL * middle / POWER.sqrt())
 }

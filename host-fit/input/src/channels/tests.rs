@@ -270,7 +270,7 @@ fn the_floor_has_no_coarse_steps_and_a_noisy_probe_counts_as_the_middle_one() {
         "{own:?}"
     );
     let coarse = floor(|code, _| code - code.rem_euclid(20));
-    assert!((coarse[1] / own[1] - 1.0).abs() < 0.08, "{coarse:?}");
+    assert!((coarse[1] / own[1] - 1.0).abs() < 0.1, "{coarse:?}");
     let noisy = floor(|code, k| code + [60, -60][k % 2]);
     assert!(own.contains(&noisy[1]), "{noisy:?}");
 }
