@@ -87,14 +87,17 @@ pub fn columns(dataset: &Dataset, stage: &Stage) -> Vec<Column> {
 
 /// The noise of the probes A, B, C that makes the noise floor in service, m: the median of the logs, from the readings
 /// alone, so no reference raises the floor. Steps that are coarser than a code are taken off, and a noisy probe counts
-/// as the middle probe.
-pub fn probe_noise_m(columns: &[Column]) -> [f64; 3] {
-    let own_m = PROBES.map(|probe| {
-        let own = columns.iter().filter(|column| column.channel == probe);
-        median(&mut own.map(Column::fine_noise_m).collect::<Vec<f64>>()).unwrap_or(0.0)
-    });
-    let usual_m = median(&mut own_m.clone()).unwrap_or(0.0);
-    own_m.map(|m| if m > NOISY * usual_m { usual_m } else { m })
+/// as the middle probe. `None` without six consecutive rows.
+pub fn probe_noise_m(columns: &[Column]) -> Option<[f64; 3]> {
+    let own_m = |probe: usize| {
+        let own = columns
+            .iter()
+            .filter(|column| column.channel == PROBES[probe]);
+        median(&mut own.filter_map(Column::fine_noise_m).collect::<Vec<f64>>())
+    };
+    let own_m = [own_m(0)?, own_m(1)?, own_m(2)?];
+    let usual_m = median(&mut own_m.clone())?;
+    Some(own_m.map(|m| if m > NOISY * usual_m { usual_m } else { m }))
 }
 
 /// Leaves out falls of the noise where all probes show motion.
@@ -155,12 +158,12 @@ impl Column {
     }
 
     /// Its noise with steps of one unit, m.
-    fn fine_noise_m(&self) -> f64 {
+    fn fine_noise_m(&self) -> Option<f64> {
         let [own_m2, fine_m2] = [self.step_m, self.unit_m].map(|step_m| step_m * step_m / 12.0);
-        let noise_m = self.white_noise_m.unwrap_or(0.0);
+        let noise_m = self.white_noise_m?;
         let noise_m2 = noise_m * noise_m - own_m2 + fine_m2;
         // A step of more than six times the noise hides it.
-        noise_m2.max(own_m2 / 3.0).max(fine_m2).sqrt()
+        Some(noise_m2.max(own_m2 / 3.0).max(fine_m2).sqrt())
     }
 
     /// Whether its noise is below its step, so that it shows the rounding alone.

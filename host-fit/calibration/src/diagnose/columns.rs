@@ -52,7 +52,7 @@ impl ColumnFaults {
         stage: &Stage,
         parameters: &FieldParameters,
     ) -> Self {
-        let probes_m = probe_noise_m(columns);
+        let probes_m = probe_noise_m(columns).unwrap_or([stage.hall.m_per_count; 3]);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
         let probes_mm = probes_m.map(|m| m * 1e3);
         let service = declared_service(stage, parameters, probes_mm);

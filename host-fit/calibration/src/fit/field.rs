@@ -62,7 +62,9 @@ impl Job<'_> {
     pub(super) fn fit_field(&self, model: &'static Model) -> Result<Fit, FitError> {
         let started = Instant::now();
         let first = self.first_phase()?;
-        let floor_mm = probe_noise_m(&columns(self.dataset, self.stage)).map(|m| m * 1e3);
+        // Without six consecutive rows the residuals show the noise.
+        let noise_m = probe_noise_m(&columns(self.dataset, self.stage));
+        let floor_mm = noise_m.map_or([f64::INFINITY; 3], |noise_m| noise_m.map(|m| m * 1e3));
         let found = first.field.clone().finish(self.stage, floor_mm)?;
         let comparison = found.figures.comparison;
         if comparison.loses() {

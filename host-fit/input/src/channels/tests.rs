@@ -262,7 +262,8 @@ fn the_floor_has_no_coarse_steps_and_a_noisy_probe_counts_as_the_middle_one() {
         for (k, row) in dataset.rows.iter_mut().enumerate() {
             row.frame.codes.hall[1] = change(row.frame.codes.hall[1], k);
         }
-        probe_noise_m(&columns(&dataset, &stage())).map(|m| m / stage().hall.m_per_count)
+        let noise_m = probe_noise_m(&columns(&dataset, &stage())).expect("runs of six rows");
+        noise_m.map(|m| m / stage().hall.m_per_count)
     };
     let own = floor(|code, _| code);
     assert!(

@@ -87,8 +87,8 @@ pub struct Calibrated<'a> {
     pub start: &'a FieldParameters,
     /// The model.
     pub model: ModelKind,
-    /// The noise of the probes in service, mm.
-    pub floor_mm: [f64; 3],
+    /// The noise of the probes in service, mm; `None` where the readings of the log do not show it.
+    pub floor_mm: Option<[f64; 3]>,
     /// Whether the model describes service and the log determines it without declared errors of the resets.
     pub is_for_service: bool,
     /// Whether the parameters are fitted to the rows that are judged.
@@ -222,7 +222,9 @@ impl Finder<'_> {
 
     fn faults(&self, faultless: &Estimate) -> Option<Faults> {
         let by = self.calibrated;
-        let floor_mm = [0, 1, 2].map(|k| by.floor_mm[k].min(self.means.white_mm[k]));
+        let white_mm = self.means.white_mm;
+        let floor_mm = by.floor_mm.unwrap_or(white_mm);
+        let floor_mm = [0, 1, 2].map(|k| floor_mm[k].min(white_mm[k]));
         let declared = declared_service(self.stage, by.parameters, floor_mm)?;
         let own = self.own_curvature(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
