@@ -260,9 +260,7 @@ impl Diagnosis {
                 .as_ref()
                 .is_some_and(|of| of.findings.iter().any(parts));
             let mistake = structure::structure(without_outliers, stage, disagree);
-            // Where axes move together, a signal follows the reference in other ways than a line.
-            let is_shown = |found: &Finding| is_described || found.kind != Kind::NotLinear {};
-            self.findings.extend(mistake.filter(is_shown));
+            self.findings.extend(mistake);
         }
         let mut of = of_rows?;
         self.predicted = of.predicted;

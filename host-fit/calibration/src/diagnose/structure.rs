@@ -62,7 +62,10 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let fitted = fitted(dataset, stage.servo_period_s)?;
     let strange = (0..3).filter(|&probe| fitted[probe].left > LEFT_MAX);
     let strange: Vec<Channel> = strange.map(|probe| Channel::SINGLE[probe]).collect();
-    if !strange.is_empty() {
+    let spans = spans(dataset);
+    // A probe along an axis that hardly moves shows all but a line.
+    let moves = beyond_motion(stage, &spans, &Change::nothing()) == 0.0;
+    if moves && !strange.is_empty() {
         let found = Finding::new(Kind::NotLinear {}).with_severity(Severity::Refuse);
         return Some(Finding {
             channels: strange,
@@ -81,7 +84,6 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     if as_logged < likely {
         return None;
     }
-    let spans = spans(dataset);
     // The declared motion separates mistakes that the geometry cannot.
     let rank = |mistake: Mistake| {
         let of_motion = beyond_motion(stage, &spans, &mistake.change);
