@@ -80,13 +80,20 @@ pub fn conclude(
     let verdict = match basis {
         Basis::NoFit => Some(Verdict::Refused),
         Basis::Fit { is_for_service } => {
-            if let Some(ratio) = ratio
-                && is_for_service
-                && ratio > LIMITED_MAX
-                && !is_refused(&ranked)
-            {
-                let together = Finding::new(Kind::FaultsTogether { ratio });
-                ranked.insert(0, together.with_cost(ratio));
+            if let Some(predicted) = predicted.filter(|_| is_for_service) {
+                let (ratio, ratios) = (predicted.worst_ratio(), predicted.ratio);
+                let are_notes = ranked.iter().all(|found| found.severity == Severity::Note);
+                let cause = if ratio > GOOD_MAX && are_notes {
+                    let open = Finding::new(Kind::NotDetermined { ratios });
+                    Some(open.with_severity(severity(ratio)))
+                } else if ratio > LIMITED_MAX && !is_refused(&ranked) {
+                    Some(Finding::new(Kind::FaultsTogether { ratio }))
+                } else {
+                    None
+                };
+                if let Some(cause) = cause {
+                    ranked.insert(0, cause.with_cost(ratio));
+                }
             }
             Some(decide(&ranked, is_for_service))
         }

@@ -24,7 +24,10 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         Some(_) => "; errors on the log include its faults, the calibration is free of them",
         None => "",
     };
-    let within = diagnosis.validity.map_or(String::new(), |validity| {
+    let reaches = diagnosis
+        .validity
+        .filter(|validity| validity.within_k > 0.0);
+    let within = reaches.map_or(String::new(), |validity| {
         let (digits, logged) = match validity.is_followed {
             true => (0, ""),
             false => (1, ", which was not logged"),
@@ -32,9 +35,8 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         let within_k = validity.within_k;
         format!("; good within {within_k:.digits$} K of the temperature of calibration{logged}")
     });
-    let motion = diagnosis
-        .motion
-        .map_or(String::new(), |motion| format!("; {}", up_to(&motion)));
+    let moves = diagnosis.motion.filter(|motion| motion.speed_m_s > 0.0);
+    let motion = moves.map_or(String::new(), |motion| format!("; {}", up_to(&motion)));
     format!(
         "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}{motion}"
     )
