@@ -11,14 +11,13 @@ const ROWS: usize = 6;
 const NEAR: [f64; 3] = [1.406_25, -0.562_5, 0.156_25];
 /// The same without the first row.
 const FAR: [f64; 3] = [2.406_25, -2.062_5, 0.656_25];
-/// Motion over some rows is a parabola within a part of this, m. A smaller jump costs nothing.
-const LEAST_M: f64 = 1e-6;
 /// A jump without the rows beside it is the same within this part; a spike is not.
 const STAYS_PART: f64 = 0.2;
 /// Hall probes that jump by more than this part show a motion, ...
 const HALL_PART: f64 = 0.4;
-/// ... or jump by their noise, four standard deviations, m.
-const HALL_NOISE_M: f64 = 4.5e-6;
+/// ... or jump by more than their noise, four standard deviations, m. A smaller jump of a beam may be a motion that starts
+/// at once, which the noise hides. It costs less than 2 %.
+const LEAST_M: f64 = 4.5e-6;
 /// Consecutive rows are closer than this many periods.
 const GAP_PERIODS: f64 = 1.5;
 
@@ -69,7 +68,7 @@ fn in_movement(rows: &[Row], interferometer: &Interferometer, gap_us: f64) -> Ve
         let seen_m = jumps(window, NEAR, |row| row.signal_m).map(f64::abs);
         let is_seen = seen_m
             .iter()
-            .any(|jump| *jump > f64::max(HALL_PART * most, HALL_NOISE_M));
+            .any(|jump| *jump > f64::max(HALL_PART * most, LEAST_M));
         let is_even = || {
             window
                 .windows(2)
@@ -122,7 +121,7 @@ mod tests {
         let mut log = run();
         assert!(log.split_at_resets(interferometer).is_empty());
         let (end, count) = (log.rows.len(), log.movements.len());
-        add(&mut log, 4321, end, [2.0, -1.5, 10.0]);
+        add(&mut log, 4321, end, [5.0, -3.0, 10.0]);
         add(&mut log, 9876, end, [-40.0, 0.0, 0.0]);
         assert_eq!(log.split_at_resets(interferometer), [4321, 9876]);
         assert_eq!(log.movements.len(), count + 2);
@@ -146,5 +145,11 @@ mod tests {
             (*a, *b, *c) = (*a - 15e-6, *b - 15e-6, *c + 20e-6);
         }
         assert!(motion.split_at_resets(interferometer).is_empty());
+        // A speed of 2 mm/s that starts at once.
+        let mut start = run();
+        for (k, row) in start.rows[4321..].iter_mut().enumerate() {
+            row.reference[1] += 4e-6 * k as f64;
+        }
+        assert!(start.split_at_resets(interferometer).is_empty());
     }
 }
