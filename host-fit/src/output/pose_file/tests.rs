@@ -217,11 +217,12 @@ fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
 
 #[test]
 fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
-    let (acceleration, rows) = (1e-6, 9000);
+    // One sine, of 1 um at 5 Hz; rows wait in pieces.
+    let (amplitude, per_s, rows) = (1e-6, 10.0 * std::f64::consts::PI, 9000);
     let mut log = "movement,t_us,cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt,cmd_x_m,cmd_y_m,cmd_rz_rad\n".to_owned();
     for row in 0..rows {
         let t_s = 2e-3 * f64::from(row);
-        let x_m = 0.5 * acceleration * t_s * t_s;
+        let x_m = amplitude * (per_s * t_s).sin();
         log += &format!("0,{},40,50,60,1000,200,-300,{x_m:e},0,0\n", 2000 * row);
     }
     let folder = tempfile::tempdir().expect("a folder");
@@ -234,7 +235,7 @@ fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
     (
         correction.velocity_s[0][0],
         correction.acceleration_s2[1][0],
-    ) = (10.0, 20.0);
+    ) = (0.1, 0.01);
     let decoder = decoder();
     let planar = |correction| {
         let settings = DecodeSettings {
@@ -253,12 +254,23 @@ fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
         (rows as usize, rows as usize)
     );
     for (row, (corrected, plain)) in corrected.iter().zip(&plain).enumerate() {
-        let added = [corrected.x_m - plain.x_m, corrected.y_m - plain.y_m].map(f64::from);
-        let wanted = [10.0 * acceleration * 2e-3 * row as f64, 20.0 * acceleration];
-        for (added, wanted) in added.into_iter().zip(wanted) {
-            assert!((added - wanted).abs() < 2e-8, "{row}: {added} {wanted}");
-        }
         assert_eq!(corrected.rz_rad, plain.rz_rad);
+        // At the ends of the log one side is missing.
+        if !(20..rows as usize - 20).contains(&row) {
+            continue;
+        }
+        let added = [corrected.x_m - plain.x_m, corrected.y_m - plain.y_m].map(f64::from);
+        let phase = per_s * 2e-3 * row as f64;
+        let [speed, acceleration] = [amplitude * per_s, amplitude * per_s * per_s];
+        let wanted = [
+            0.1 * speed * phase.cos(),
+            -0.01 * acceleration * phase.sin(),
+        ];
+        let largest = [0.1 * speed, 0.01 * acceleration];
+        for (axis, (added, wanted)) in added.into_iter().zip(wanted).enumerate() {
+            let off = (added - wanted).abs() / largest[axis];
+            assert!(off < 0.02, "{row}: {added} {wanted}");
+        }
     }
 }
 
