@@ -236,6 +236,32 @@ mod tests {
     }
 
     #[test]
+    fn a_log_that_is_not_good_has_a_finding_that_says_why() {
+        let fit = Basis::Fit {
+            is_for_service: true,
+        };
+        let causes = |worst: f64, findings: Vec<Finding>| {
+            let predicted = Predicted {
+                rms: [1e-6; 3],
+                ratio: [1.0, worst, 1.0],
+                range: [[1e-6; 2]; 3],
+            };
+            let (ranked, verdict) = conclude(findings, Some(&predicted), [0.0; 3], fit);
+            let first = ranked.first().map(|found| (found.code(), found.severity));
+            (verdict, first)
+        };
+        let open = |severity| Some((Code::NotDetermined, severity));
+        assert_eq!(causes(1.09, vec![]), (Some(Verdict::Good), None));
+        let limited = (Some(Verdict::Limited), open(Severity::Warn));
+        assert_eq!(causes(1.2, vec![]), limited);
+        let refused = (Some(Verdict::Refused), open(Severity::Refuse));
+        assert_eq!(causes(1.4, vec![]), refused);
+        let step = change(Quantity::Zero, TimeCourse::Onset, Channel::BeamY1);
+        let told = (Some(Verdict::Limited), Some((Code::Step, Severity::Warn)));
+        assert_eq!(causes(1.2, vec![step]), told);
+    }
+
+    #[test]
     fn what_no_prediction_holds_keeps_a_verdict_from_good() {
         let good = Predicted {
             rms: [1e-6; 3],

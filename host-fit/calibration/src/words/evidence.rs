@@ -1,6 +1,7 @@
 //! The evidence of a finding: what happened, and how large it is.
 
 use super::causes::mistake;
+use super::finding::is_late_sensor;
 use hallstage_input::axis::{counted, sign};
 use hallstage_input::finding::{Finding, Kind, Place, Quantity, TimeCourse};
 
@@ -205,12 +206,13 @@ fn way(late: f64) -> &'static str {
     if late > 0.0 { "behind" } else { "ahead of" }
 }
 
-/// The errors in service that a fault makes by itself.
+/// The errors in service that a fault makes by itself. A late sensor makes most of them in service: see `motion`.
 fn cost(found: &Finding) -> String {
     let words = |cost: f64| {
         format!(". Alone it makes errors in service of {cost:.2} times the noise floor")
     };
-    found.cost.map_or(String::new(), words)
+    let cost = found.cost.filter(|_| !is_late_sensor(found));
+    cost.map_or(String::new(), words)
 }
 
 /// The first names of a list.

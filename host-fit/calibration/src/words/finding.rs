@@ -14,8 +14,7 @@ pub fn message(found: &Finding) -> String {
     if let Some([rows, all]) = found.sample {
         text += &format!(" This is from {rows} of {all} rows.");
     }
-    let is_beam = found.channels().iter().all(|channel| channel.is_beam());
-    if found.is_repaired && found.code() == Code::ReferenceLag && !is_beam {
+    if found.is_repaired && is_late_sensor(found) {
         text += " The parameters are free of this lag. In service the channel stays late.";
     } else if found.is_repaired {
         text += " The calibration is free of this fault and describes the stage at the end of the log: zero the stage before use.";
@@ -24,6 +23,12 @@ pub fn message(found: &Finding) -> String {
         remedy if remedy.is_empty() => text,
         remedy => text + " " + &sentence(&remedy),
     }
+}
+
+/// Whether it is about a sensor that stays late in service.
+pub(super) fn is_late_sensor(found: &Finding) -> bool {
+    let is_beam = found.channels().iter().all(|channel| channel.is_beam());
+    found.code() == Code::ReferenceLag && !is_beam
 }
 
 /// The file or the log of the finding.
