@@ -51,3 +51,20 @@ fn a_rough_reference_does_not_raise_the_noise_floor() {
         );
     }
 }
+
+/// A fit cannot see the missing bit: it takes its steps for noise.
+#[test]
+fn a_missing_bit_of_a_probe_is_in_the_prediction() {
+    let mut stuck = recording(3);
+    for sample in stuck.movements.iter_mut().flatten() {
+        sample.hall[0] |= 1 << 6;
+    }
+    let diagnosis = diagnosed(stuck, |_, _| {});
+    assert!(diagnosis.verdict != Some(Verdict::Good));
+    let is_stuck = |found: &&Finding| found.code() == Code::StuckBit;
+    let found = diagnosis.findings.iter().find(is_stuck);
+    let cost = found.and_then(|found| found.cost).expect("a cost");
+    let ratio = diagnosis.predicted.expect("figures").worst_ratio();
+    // The bit has 4 times the noise of the probe, and half of the values miss it.
+    assert!(cost > 2.0 && ratio > 0.95 * cost, "{ratio} {cost}");
+}
