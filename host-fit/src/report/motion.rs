@@ -5,7 +5,7 @@ use hallstage_calibration::fit::Fit;
 use hallstage_calibration::judge::in_motion::InMotion;
 use serde_json::{Value, json};
 
-/// The motion up to which errors are good: rms, all axes at once, rotations at 0.25 m.
+/// The largest motion with good errors: rms, all axes at once, rotations at 0.25 m.
 pub(super) fn valid_up_to(motion: InMotion) -> Value {
     json!({
         "acceleration_m_s2": motion.acceleration_m_s2,

@@ -95,10 +95,10 @@ impl Report {
     /// | `excerpt` | rows of a long log that fit, diagnosis and figures use, and their runs of successive rows; null for all rows |
     /// | `zero_deviations` | of each movement that was judged |
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
-    /// | `valid_up_to` | the rms acceleration and speed of all axes at once up to which they are good |
+    /// | `valid_up_to` | the largest rms acceleration and speed of all axes at once with good errors |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `channels` | properties of each column of the logs |
-    /// | `reference` | the point whose pose is calibrated, and the places of the beams |
+    /// | `reference` | the calibrated point, and the places of the beams |
     /// | `trusted_inputs` | the inputs with errors that no log shows, an error of each, and its cost |
     pub fn from_judgement(judged: Judged) -> Self {
         let Judged {

@@ -60,7 +60,7 @@ pub struct Summary {
     pub axes: Table,
     /// What to do next; empty if nothing.
     pub next: String,
-    /// Whether that is the remedy of a finding, whose message ends with it.
+    /// Whether that is the remedy of a finding. The message of the finding ends with it.
     #[serde(skip)]
     is_remedy: bool,
 }

@@ -97,11 +97,7 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
             "field",
             "the field model: errors predicted over the range",
         ),
-        (
-            "paper.csv",
-            "31",
-            "model (31): this log leaves the field model",
-        ),
+        ("paper.csv", "31", "model (31): by this log the field model"),
     ] {
         let json = bench.figures(&format!("fit {log} --out auto.bin"));
         assert_eq!(json["model"], model);

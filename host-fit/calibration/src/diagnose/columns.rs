@@ -33,7 +33,7 @@ enum Effect {
     Variance(f64),
     /// The reference has an error that follows the motion, rms m.
     Bent(f64),
-    /// Nothing shows its size.
+    /// Its size is not known.
     Unknown,
 }
 

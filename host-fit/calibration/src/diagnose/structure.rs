@@ -19,7 +19,7 @@ use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
 
-/// For how long a model errs alike, s: its errors go with the motion. What it leaves unexplained
+/// For how long a model errs alike, s: its errors go with the motion. What stays unexplained
 /// counts as one residual in that time.
 const ALIKE_S: f64 = 0.5;
 /// Unknowns of a probe: gains and their slopes, the shift of the probe by height and tilts, and the lags of the beams.
@@ -34,12 +34,12 @@ const WEAK: f64 = 0.01;
 /// Sum of squared distances over tolerances of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
 
-/// Magnets of another workshop are up to this many times the tolerances off: what they cost is seen in the residuals
-/// and the prediction.
+/// Magnets of another workshop are up to this many times the tolerances off. Residuals and prediction show their
+/// cost.
 const UNUSUAL_MAX: f64 = 2.0;
 /// Farther off, several mistakes at once are likely.
 const STRANGE_MAX: f64 = 4.0;
-/// Mistakes are linear. Where a linear model leaves more than this part of the variance of a signal, none is the cause.
+/// Mistakes are linear. They are no cause where more than this part of the variance of a signal is not linear.
 const LEFT_MAX: f64 = 0.1;
 
 type Vector = SVector<f64, 6>;

@@ -1,4 +1,4 @@
-//! A run that shows lags and accelerations, then fast moves: what is forecast, and what the correction leaves.
+//! A run that shows lags and accelerations, then fast moves: the forecast, and the errors after the correction.
 
 use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};

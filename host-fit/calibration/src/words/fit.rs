@@ -166,7 +166,7 @@ fn compared(comparison: &Comparison) -> String {
         )
     } else if comparison.loses() {
         format!(
-            "this log leaves the field model with errors of {field}; record all six axes moving at once, and for longer (host-fit plan makes such a run)"
+            "by this log the field model has errors of {field}; record all six axes moving at once, and for longer (host-fit plan makes such a run)"
         )
     } else {
         "the field model finds nothing that model (31) lacks".to_owned()

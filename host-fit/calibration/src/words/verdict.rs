@@ -42,7 +42,7 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
     )
 }
 
-/// The motion up to which errors are good.
+/// The largest motion with good errors.
 pub fn up_to(motion: &InMotion) -> String {
     let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
     let open = match motion.fit.shows_acceleration {

@@ -7,7 +7,7 @@ use std::ops::Range;
 const EVERY_MAX: usize = 40;
 /// The primes up to it.
 const PRIMES: [usize; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-/// Rows of a block in which the new values keep their phase.
+/// Rows of a block: new values keep their phase for so long.
 const BLOCK: usize = 2000;
 /// A pattern is there if its power is this many standard deviations above chance.
 const PATTERN: f64 = 15.0;

@@ -1,4 +1,4 @@
-//! Each property is put into the shipped run, whose channels have none.
+//! Each property is put into the shipped run. Its channels have none.
 
 use super::*;
 use crate::dataset::Row;

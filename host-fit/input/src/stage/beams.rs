@@ -28,7 +28,7 @@ const PLACES_M: (f64, f64) = (-2.0, 2.0);
 const ANGLES_RAD: (f64, f64) = (-0.1, 0.1);
 /// Factors of the readings that make sense.
 const SCALES: (f64, f64) = (0.1, 10.0);
-/// Largest part of the baseline by which the places of the Y beams may differ from it: the digits of a drawing.
+/// The places of the Y beams may differ from the baseline by this part of it: the digits of a drawing.
 const ROUNDING: f64 = 1e-6;
 /// Least determinant of the beams by X, Y and Rz, as a part of the baseline.
 const DETERMINANT_MIN: f64 = 0.1;

@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) struct Beam {
     /// Where it meets its mirror, from the tool point, m.
     pub(super) place_m: Vector3<f64>,
-    /// Unit vector in the direction in which it measures: the normal of its mirror.
+    /// Unit vector of its direction: the normal of its mirror.
     pub(super) direction: Vector3<f64>,
 }
 

@@ -145,7 +145,7 @@ impl MotionFit {
         self
     }
 
-    /// The same with what it does not determine of acceleration taken as zero.
+    /// The same, where an effect of acceleration that it does not determine is zero.
     #[must_use]
     pub fn without_prior(mut self) -> Self {
         if !self.shows_acceleration {
@@ -216,7 +216,7 @@ const fn column(probe: usize, axis: usize) -> usize {
     ACCELERATIONS + 6 * probe + axis
 }
 
-/// The covariance of the lags of A, B, C, from that of A and B: their sum is zero.
+/// The covariance of the lags of A, B, C from the covariance of A and B: their sum is zero.
 fn three_lags(two: Matrix2<f64>) -> Matrix3<f64> {
     let by_two = SMatrix::<f64, 3, 2>::new(1.0, 0.0, 0.0, 1.0, -1.0, -1.0);
     by_two * two * by_two.transpose()

@@ -63,7 +63,7 @@ impl DecodeSettings<'_> {
 /// and what is odd about the log.
 ///
 /// # Errors
-/// Errors of the log, after the rows above its first fault, and those of the output,
+/// Errors of the log, after the rows above its first fault, and errors of the output,
 /// which then has not changed. A pipe keeps what was written to it.
 pub fn decode_log<E: From<LogError> + From<OutputError>>(
     log: &Path,

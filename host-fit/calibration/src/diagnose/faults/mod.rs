@@ -9,7 +9,7 @@
 //! | `motion` | errors of channels that follow the motion, in a log and in service |
 //! | `evidence` | what the residuals still show after all faults |
 //! | `slow` | slow residuals beyond noise and drift |
-//! | `unexplained` | the cost of these residuals in service |
+//! | `unexplained` | their cost in service |
 //! | `price` | the cost of the faults, and the repair |
 //! | `findings` | the faults as findings |
 
