@@ -8,6 +8,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::PathBuf;
 
+/// Rows are consecutive if the time between them is below this many median times.
+pub(crate) const GAP_PERIODS: f64 = 1.5;
+
 /// The most rows that a fit works on. Of longer logs it takes a sample: what more rows would add to
 /// a calibration is far below the noise of a pose.
 pub const FIT_ROWS_MAX: usize = 125_000;

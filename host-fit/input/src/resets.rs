@@ -2,7 +2,7 @@
 //!
 //! A movement ends there, so that each part has its own zero deviation.
 
-use super::dataset::{Dataset, Movement, Row};
+use super::dataset::{Dataset, GAP_PERIODS, Movement, Row};
 use super::stage::Interferometer;
 
 /// Rows on either side of a jump.
@@ -18,8 +18,6 @@ const HALL_PART: f64 = 0.4;
 /// ... or jump by more than their noise, four standard deviations, m. A smaller jump of a beam may be a motion that starts
 /// at once, which the noise hides. It costs less than 2 %.
 const LEAST_M: f64 = 4.5e-6;
-/// Consecutive rows are closer than this many periods.
-const GAP_PERIODS: f64 = 1.5;
 
 impl Dataset {
     /// Ends movements where beams jump and the probes do not, and returns the first rows of the new movements.

@@ -1,12 +1,9 @@
 //! The values of one channel, in runs of consecutive rows.
 
 use crate::channel::Channel;
-use crate::dataset::{Dataset, LogSource, Row};
+use crate::dataset::{Dataset, GAP_PERIODS, LogSource, Row};
 use crate::stage::Stage;
 use std::ops::Range;
-
-/// Rows are consecutive if the time between them is below this many median times.
-const GAP_PERIODS: f64 = 1.5;
 
 /// One channel of one log.
 pub(super) struct Signal<'a> {

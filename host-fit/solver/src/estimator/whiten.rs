@@ -17,7 +17,7 @@ use crate::estimator::gauss_newton::{Equations, Normal, Point};
 
 /// The column of the lag of the reference, behind the parameters and k and h of A, B, C beyond their priors.
 pub const LAG: usize = Coefficient::ROWS;
-/// The columns of the lags of A and B behind the mean of the probes; that of C is the negative sum.
+/// The columns of the lags of A and B behind the mean of the probes; the lag of C is the negative sum.
 pub const PROBE_LAGS: usize = LAG + 1;
 /// The columns of the changes by acceleration of the six axes, of A, B, C.
 pub const ACCELERATIONS: usize = PROBE_LAGS + 2;
@@ -298,106 +298,5 @@ fn solve(l: &Matrix, right: [f64; 3]) -> [f64; 3] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RESIDUAL: usize = COLUMNS - 1;
-    use crate::estimator::sample_for_tests::{Run, parameters};
-    use nalgebra::{Cholesky, DMatrix};
-
-    /// Central differences of the residuals, about a stage with lags and accelerations.
-    #[test]
-    fn the_columns_of_motion_are_the_derivatives_of_the_model() {
-        let run = Run {
-            seconds: 1.0,
-            ..Run::EIGHT_SECONDS
-        };
-        let dataset = run.dataset(&parameters());
-        let all: Vec<usize> = (0..dataset.rows.len()).collect();
-        let rows = Rows::new(&dataset, &all);
-        let at = |unknown: usize, change: f64| {
-            let mut values = [0.0; UNKNOWNS];
-            values[LAG..ACCELERATIONS].copy_from_slice(&[2e-3, -1e-3, 4e-4]);
-            values[ACCELERATIONS..].fill(2e-3);
-            values[unknown] += change;
-            let dynamics = Dynamics::from_values(&values);
-            rows.evaluate(&probes(&parameters()), &dynamics, &[[0.0; 3]])
-        };
-        for unknown in LAG..UNKNOWNS {
-            let step = 1e-4;
-            let (before, after) = (at(unknown, -step), at(unknown, step));
-            let mut largest: f64 = 0.0;
-            for (k, block) in at(unknown, 0.0).iter().enumerate() {
-                let found: [[f64; COLUMNS]; 3] = columns(block);
-                for (probe, row) in found.iter().enumerate() {
-                    let change = before[k].residual_mm[probe] - after[k].residual_mm[probe];
-                    let error = (row[unknown] - change / (2.0 * step)).abs();
-                    assert!(error < 1e-6, "{unknown}, {probe}: {error}");
-                    largest = largest.max(row[unknown].abs());
-                }
-            }
-            assert!(largest > 1e-3, "{unknown}: {largest}");
-        }
-    }
-
-    /// The same sums from the covariance of all residuals of each movement, written out whole:
-    /// white noise, walk and offset.
-    #[test]
-    fn the_filter_whitens_as_the_whole_covariance_does() {
-        let run = Run {
-            movements: 2,
-            seconds: 0.3,
-            ..Run::EIGHT_SECONDS
-        };
-        let dataset = run.dataset(&parameters());
-        let all: Vec<usize> = (0..dataset.rows.len()).collect();
-        let rows = Rows::new(&dataset, &all);
-        let blocks = rows.evaluate(&probes(&parameters()), &Dynamics::default(), &[[0.0; 3]; 2]);
-        let noise = Noise {
-            white_mm: [5e-4, 4e-4, 6e-4],
-            drift_mm: [1e-3, 2e-3, 5e-4],
-        };
-        for resets_mm in [None, Some([2e-3, 3e-3, 1e-3])] {
-            let reset_mm = resets_mm.unwrap_or([OFFSET_MM; 3]);
-            let equations = FieldEquations {
-                rows: &rows,
-                places: parameters().places,
-                noise,
-                resets_mm,
-                faults: &[],
-            };
-            let found = equations.sum_blocks(&blocks);
-
-            let mut products = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
-            for movement in &rows.movements {
-                let blocks = &blocks[movement.clone()];
-                assert!(blocks.len() > 10);
-                let covariance = DMatrix::from_fn(3 * blocks.len(), 3 * blocks.len(), |i, j| {
-                    let (a, b) = (&blocks[i / 3], &blocks[j / 3]);
-                    let time_s = a.time_s.min(b.time_s) - blocks[0].time_s;
-                    let shared: f64 = (0..3)
-                        .map(|axis| {
-                            let walk =
-                                noise.drift_mm[axis].powi(2) * time_s + reset_mm[axis].powi(2);
-                            a.by_pose[i % 3][axis] * walk * b.by_pose[j % 3][axis]
-                        })
-                        .sum();
-                    let white = noise.white_mm[i % 3].powi(2) / a.rows;
-                    shared + if i == j { white } else { 0.0 }
-                });
-                let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
-                    columns::<COLUMNS>(&blocks[i / 3])[i % 3][j]
-                });
-                let factor = Cholesky::new(covariance).expect("positive");
-                products += columns.transpose() * factor.solve(&columns);
-            }
-            for i in 0..=RESIDUAL {
-                for j in i..=RESIDUAL {
-                    let size = (products[(i, i)] * products[(j, j)]).sqrt();
-                    let error = (found.curvature(i, j) - products[(i, j)]).abs();
-                    assert!(error <= 1e-6 * size, "{i} {j}: {error} {size}");
-                }
-            }
-        }
-    }
-}
+#[path = "whiten_tests.rs"]
+mod tests;
