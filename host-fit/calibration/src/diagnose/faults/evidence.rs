@@ -64,57 +64,16 @@ impl Evidence {
             let from = if j == residual { RESIDUAL } else { j };
             fill(&mut table, j, &groups, |at, k| estimate.rows[at][k][from]);
         }
-        let mut products = DMatrix::zeros(residual + 1, residual + 1);
-        for j in 0..=residual {
-            for i in 0..=j {
-                let product = table.column(i).dot(&table.column(j));
-                (products[(i, j)], products[(j, i)]) = (product, product);
-            }
-        }
-        let mut prior = estimate.prior.clone();
-        for k in PROBE_LAGS..UNKNOWNS {
-            let deviation = if k < ACCELERATIONS {
-                PROBE_LAG_S
-            } else {
-                PER_ACCELERATION
-            };
-            prior[(k, k)] = 1.0 / (deviation * deviation);
-        }
-        let pull = &prior * estimate.values();
-        for i in 0..UNKNOWNS {
-            products[(i, residual)] -= pull[i];
-            products[(residual, i)] -= pull[i];
-            for j in 0..UNKNOWNS {
-                products[(i, j)] += prior[(i, j)];
-            }
-        }
+        let mut products = with_prior(table.tr_mul(&table), estimate);
         let own: Vec<f64> = (0..residual).map(|j| products[(j, j)]).collect();
         for (k, own) in own.iter().enumerate().take(known) {
             let least = if k < UNKNOWNS { ROUNDING } else { SEEN_MIN };
             sweep(&mut products, k, least * own);
         }
         let before = estimate.curvature.inverse();
-        let freedom = table.nrows().saturating_sub(known).max(table.nrows() / 2) as f64;
-        // Noise that is not white is largest at the frequencies of motion.
-        let misfit = |products: &DMatrix<f64>, chosen: &[usize]| {
-            let mut left = table.column(residual).into_owned();
-            for j in (0..known).chain(chosen.iter().copied()) {
-                left.axpy(-products[(j, residual)], &table.column(j), 1.0);
-            }
-            let slow = left.as_slice().chunks(3 * SLOWER).map(|few| {
-                let share = 3.0 / few.len() as f64;
-                let sum = |k: usize| few.iter().skip(k).step_by(3).sum::<f64>();
-                share * [0, 1, 2].map(|k| sum(k).powi(2)).iter().sum::<f64>()
-            });
-            // The parameters follow up to half of that.
-            let slow = slow.sum::<f64>() / (0.5 * (table.nrows() / SLOWER) as f64);
-            (products[(residual, residual)] / freedom)
-                .max(slow)
-                .max(1.0)
-        };
         let mut chosen: Vec<usize> = Vec::new();
         while chosen.len() < ERRORS_MAX {
-            let misfit = misfit(&products, &chosen);
+            let misfit = misfit(&table, &products, known, &chosen);
             let gain = |&j: &usize| products[(j, residual)].powi(2) / (products[(j, j)] * misfit);
             let is_seen =
                 |j: &usize| !chosen.contains(j) && products[(*j, *j)] > SEEN_MIN * own[*j];
@@ -151,12 +110,57 @@ impl Evidence {
             errors: chosen.iter().map(size).collect(),
             shift: DVector::from_fn(COUNT, |k, _| products[(k, residual)]),
             added: (products.view((0, 0), (COUNT, COUNT)) - before.view((0, 0), (COUNT, COUNT)))
-                * misfit(&products, &chosen),
+                * misfit(&table, &products, known, &chosen),
             sizes: (UNKNOWNS..known).map(|k| products[(k, residual)]).collect(),
             probe_lags_s: [a, b, -a - b],
             slow_mm2: slow_mm2(means, &left),
         })
     }
+}
+
+/// Normal equations of the unknowns, of further errors and, last, of the residual, with the prior of the fit. Lags and
+/// accelerations have a prior of their own: an error may look like them.
+fn with_prior(mut products: DMatrix<f64>, estimate: &Estimate) -> DMatrix<f64> {
+    let residual = products.nrows() - 1;
+    let mut prior = estimate.prior.clone();
+    for k in PROBE_LAGS..UNKNOWNS {
+        let deviation = if k < ACCELERATIONS {
+            PROBE_LAG_S
+        } else {
+            PER_ACCELERATION
+        };
+        prior[(k, k)] = 1.0 / (deviation * deviation);
+    }
+    let pull = &prior * estimate.values();
+    for i in 0..UNKNOWNS {
+        products[(i, residual)] -= pull[i];
+        products[(residual, i)] -= pull[i];
+        for j in 0..UNKNOWNS {
+            products[(i, j)] += prior[(i, j)];
+        }
+    }
+    products
+}
+
+/// The power of the residual over the power of noise, after the `known` unknowns and the chosen errors: of all rows or at
+/// the frequencies of motion, where noise that is not white is largest.
+fn misfit(table: &DMatrix<f64>, products: &DMatrix<f64>, known: usize, chosen: &[usize]) -> f64 {
+    let residual = products.nrows() - 1;
+    let mut left = table.column(residual).into_owned();
+    for j in (0..known).chain(chosen.iter().copied()) {
+        left.axpy(-products[(j, residual)], &table.column(j), 1.0);
+    }
+    let slow = left.as_slice().chunks(3 * SLOWER).map(|few| {
+        let share = 3.0 / few.len() as f64;
+        let sum = |k: usize| few.iter().skip(k).step_by(3).sum::<f64>();
+        share * [0, 1, 2].map(|k| sum(k).powi(2)).iter().sum::<f64>()
+    });
+    // The parameters follow up to half of the slow residual.
+    let slow = slow.sum::<f64>() / (0.5 * (table.nrows() / SLOWER) as f64);
+    let freedom = table.nrows().saturating_sub(known).max(table.nrows() / 2) as f64;
+    (products[(residual, residual)] / freedom)
+        .max(slow)
+        .max(1.0)
 }
 
 /// Changes of the signals, white.
