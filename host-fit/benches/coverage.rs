@@ -71,7 +71,7 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
         let mut error = errors.reset.map(|deviation| random.normal(deviation));
         for (row, pose) in poses.iter().enumerate() {
             let signal_m = probes.map(|probe| {
-                let signal = probe.signal_mm(pose.planar.map(|x| x * 1e3), pose.vertical) * 1e-3;
+                let signal = probe.signal_m(pose.planar, pose.vertical);
                 signal + random.normal(errors.hall_m)
             });
             dataset.rows.push(Row {

@@ -77,8 +77,8 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
     for (number, movement) in problem.rows.numbered_movements() {
         for row in &problem.rows.rows[movement] {
             let [z, rx, ry] = row.vertical;
-            let um = |mm: [f64; 3]| mm.map(|mm| mm * 1e3);
-            let numbers = [um(row.signal_mm), [z, rx, ry], um(row.reference_mm)].concat();
+            let um = |si: [f64; 3]| si.map(|si| si * 1e6);
+            let numbers = [um(row.signal_m), [z, rx, ry], um(row.reference)].concat();
             let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
             writeln!(rows, "{},{}", number, text.join(","))?;
         }

@@ -37,7 +37,7 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
-use hallstage_solver::estimator::noise::USUAL_DRIFT_MM;
+use hallstage_solver::estimator::noise::USUAL_DRIFT;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::service::ServiceVariance;
@@ -78,7 +78,7 @@ impl StoredPosterior {
         Some(Self {
             covariance: fit.estimate.posterior.covariance.clone(),
             noise: Noise {
-                white_mm: fit.estimate.posterior.white_mm,
+                white_m: fit.estimate.posterior.white_m,
                 ..figures.noise
             },
             misfit: score.chi_squared / score.residuals.max(1) as f64,
@@ -204,14 +204,14 @@ pub fn recalibrate(
         (&old_parameters, 0.0),
     );
     let covariance = known.map(|known| &known.covariance);
-    let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
+    let drift = known.map_or(USUAL_DRIFT, |known| known.noise.drift);
     let update = update(
         &dataset.without(&bad),
         stage,
         &old_parameters,
         covariance,
         change,
-        drift_mm,
+        drift,
     )?;
     let range = |words: [f32; 3]| words.map(|x| f64::from(x) / RANGE_MARGIN);
     let ranges = (
@@ -248,11 +248,11 @@ pub fn recalibrate(
     };
     let set = prepare(old, &update.parameters, stage, &origin)?;
     let judgement = judged(&set);
-    let predicted = declared_service(stage, &update.parameters, update.noise.white_mm)
+    let predicted = declared_service(stage, &update.parameters, update.noise.white_m)
         .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
-    let (white_mm, covariance) = (update.noise.white_mm, &update.posterior.covariance);
+    let (white_m, covariance) = (update.noise.white_m, &update.posterior.covariance);
     let validity =
-        known.and_then(|_| Validity::new(stage, &update.parameters, white_mm, covariance));
+        known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
     let diagnosis = Diagnosis {
         validity,
         ..diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted))

@@ -163,11 +163,6 @@ impl Stage {
         self.probes.map(|probe| probe.place_m)
     }
 
-    /// [`Stage::reset_sd`] in mm, mm, mrad.
-    pub fn resets_mm(&self) -> Option<[f64; 3]> {
-        self.reset_sd.map(|deviations| deviations.map(|x| x * 1e3))
-    }
-
     /// Lever arms and thetas of the designed probes.
     pub fn geometry(&self) -> ProbeGeometry<f64> {
         ProbeGeometry::from_places(self.places_m(), self.probes.map(|probe| probe.theta_rad))

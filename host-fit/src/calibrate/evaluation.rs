@@ -99,8 +99,8 @@ impl Evaluation {
         let mut diagnosis = diagnose_blob(&log.dataset, stage, set, blob_use);
         diagnosis.validity = known.and_then(|known| {
             let parameters = FieldParameters::from_set(set, stage)?;
-            let (white_mm, covariance) = (known.noise.white_mm, &known.covariance);
-            Validity::new(stage, &parameters, white_mm, covariance)
+            let (white_m, covariance) = (known.noise.white_m, &known.covariance);
+            Validity::new(stage, &parameters, white_m, covariance)
         });
         // As the blob's own errors were counted, whatever zeros are asked for.
         let comparable = judge.judgement(own_zeros).errors;

@@ -18,6 +18,8 @@ use std::path::{Path, PathBuf};
 const MAGIC: &[u8] = b"HALLPOS2";
 /// Rows of the covariance without and with k and h.
 const ROWS: [usize; 2] = [COUNT, COUNT + 6];
+/// The file has lengths in mm and angles in mrad.
+const MM_PER_M: f64 = 1e3;
 /// Largest file that is read.
 const BYTES_MAX: u64 = 1 << 16;
 
@@ -142,15 +144,15 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; 32], runtime::BlobError> {
 fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
     let StoredPosterior {
         covariance,
-        noise: Noise { white_mm, drift_mm },
+        noise,
         misfit,
         repaired,
     } = known;
     let rows = 0..covariance.nrows();
     let content = Content {
         blob,
-        white_mm: *white_mm,
-        drift_mm: *drift_mm,
+        white_mm: noise.white_m.map(|m| m * MM_PER_M),
+        drift_mm: noise.drift.map(|m| m * MM_PER_M),
         misfit: *misfit,
         triangle: (rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]))).collect(),
         repaired: repaired.clone(),
@@ -194,7 +196,10 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     }
     let known = StoredPosterior {
         covariance,
-        noise: Noise { white_mm, drift_mm },
+        noise: Noise {
+            white_m: white_mm.map(|mm| mm / MM_PER_M),
+            drift: drift_mm.map(|mm| mm / MM_PER_M),
+        },
         misfit,
         repaired: content.repaired,
     };
@@ -224,8 +229,8 @@ mod tests {
                 size(i) * size(j) * if i == j { 1.0 } else { 0.5 }
             }),
             noise: Noise {
-                white_mm: [5e-4, 4e-4, 6e-4],
-                drift_mm: [1e-4, 0.0, 2e-4],
+                white_m: [5e-7, 4e-7, 6e-7],
+                drift: [1e-7, 0.0, 2e-7],
             },
             misfit: 1.02,
             repaired: Vec::new(),

@@ -15,10 +15,10 @@ pub(super) fn correlation((a, b, correlation): &(String, String, f64)) -> Group 
 /// uncertainty of a pose by the parameters (the same at every visit) and by the noise of the probes (new in every servo
 /// period).
 pub fn figures(fit: &FieldFigures, posterior: &Posterior) -> Group {
-    let noise = fit.noise.white_mm.map(|mm| figure(mm * 1e3, "um"));
+    let noise = fit.noise.white_m.map(|m| figure(m * 1e6, "um"));
     group! {
         "hall_noise" => Figure::List(noise.into()),
-        "reference_drift_after_1_s" => pose(fit.noise.drift_mm.map(|mm| mm * 1e-3)),
+        "reference_drift_after_1_s" => pose(fit.noise.drift),
         "pose_uncertainty" => predictions(fit, posterior),
     }
 }

@@ -22,11 +22,11 @@ pub(super) fn probe_motion(fit: &Fit) -> Group {
         .into_iter()
         .zip(motion.probe_lag_errors_s());
     let lags = lags.map(|(value, error)| figure(value * 1e6, "us").with_error(Some(error * 1e6)));
-    let added = motion.dynamics.mm_per_m_s2.as_flattened().iter();
+    let added = motion.dynamics.m_per_m_s2.as_flattened().iter();
     let errors = motion.acceleration_errors();
     let added = added.zip(errors.as_flattened());
     let added =
-        added.map(|(value, error)| figure(value * 1e3, "um/(m/s2)").with_error(Some(error * 1e3)));
+        added.map(|(value, error)| figure(value * 1e6, "um/(m/s2)").with_error(Some(error * 1e6)));
     let correction = fit.set.motion_correction.map(|correction| {
         json!({ "acceleration_s2": correction.acceleration_s2, "velocity_s": correction.velocity_s })
     });

@@ -92,7 +92,7 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
 /// Standard error of the change of a probe's signal by the acceleration of X, Y or Rz.
 fn per_acceleration(plan: &Plan, k: usize, stage: &Stage) -> Group {
     let error = acceleration_error(&plan.run, k, stage.servo_period_s);
-    group! { "standard_error" => bare(rounded(error * 1e3, 2), "um/(m/s2)") }
+    group! { "standard_error" => bare(rounded(error * 1e6, 2), "um/(m/s2)") }
 }
 
 /// What the run cannot tell, if there is something: errors that follow an acceleration.

@@ -54,10 +54,9 @@ impl ColumnFaults {
     ) -> Self {
         let probes_m = probe_noise_m(columns).unwrap_or([stage.hall.m_per_count; 3]);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
-        let probes_mm = probes_m.map(|m| m * 1e3);
-        let service = declared_service(stage, parameters, probes_mm);
+        let service = declared_service(stage, parameters, probes_m);
         let service = service.map(|service| {
-            let floor = service.by_signals(probes_mm.map(|mm| mm * mm));
+            let floor = service.by_signals(probes_m.map(|m| m * m));
             (floor, variances(&service, stage, parameters))
         });
         let (floor, by_channel) = service.unwrap_or_default();
@@ -101,10 +100,10 @@ impl ColumnFaults {
 /// beams, which service does not have.
 fn variances(service: &Service, stage: &Stage, parameters: &FieldParameters) -> [[f64; 3]; 9] {
     let slopes = Slopes::new(stage, probes(parameters));
-    let share = 1e6 / service.poses.len() as f64;
+    let share = 1.0 / service.poses.len() as f64;
     let mut sums = [[0.0; 3]; 9];
     for ((planar, vertical), pose) in service_poses(service_range(stage)).zip(&service.poses) {
-        let by_channel = slopes.at(planar.map(|x| x * 1e3), vertical);
+        let by_channel = slopes.at(planar, vertical);
         for (sums, signals) in sums.iter_mut().zip(by_channel) {
             for (sum, by_signal) in sums.iter_mut().zip(&pose.by_signal) {
                 *sum += share * signals.dot(&Vector3::from(*by_signal)).powi(2);

@@ -120,7 +120,7 @@ pub fn diagnose_log(
         parameters: &own.parameters,
         start: &best.parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
-        floor_mm: probe_noise_m(&out.columns).map(|noise_m| noise_m.map(|m| m * 1e3)),
+        floor_m: probe_noise_m(&out.columns),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_fitted: fitted.is_ok(),
         shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.shows_acceleration),
@@ -181,7 +181,7 @@ pub fn diagnose_log(
                 .view_mut((0, 0), repair.covariance.shape())
                 .copy_from(&repair.covariance);
         }
-        Validity::new(stage, &parameters, estimate.posterior.white_mm, &covariance)
+        Validity::new(stage, &parameters, estimate.posterior.white_m, &covariance)
     });
     out
 }
@@ -358,7 +358,7 @@ pub fn diagnose_blob(
         } else {
             set.model
         },
-        floor_mm: probe_noise_m(&out.columns).map(|noise_m| noise_m.map(|m| m * 1e3)),
+        floor_m: probe_noise_m(&out.columns),
         is_for_service,
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),

@@ -29,7 +29,9 @@ const UNKNOWNS: usize = 12;
 /// its range in `stage.toml`), of theta, of a lever arm (m), of a/eta (1/mm), and of b/eta and c/eta (1/mrad), which
 /// show the place of a probe within 40 mm.
 const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
-/// Precision of a weak prior over the residual's, mm and mrad: unknowns that the log does not show stay finite.
+/// Columns of a fit are in this unit, m and rad: all unknowns are then about as large.
+const UNIT: f64 = 1e-3;
+/// Precision of a weak prior over the residual's, in this unit: unknowns that the log does not show stay finite.
 const WEAK: f64 = 0.01;
 /// Sum of squared distances over tolerances of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
@@ -45,7 +47,7 @@ const LEFT_MAX: f64 = 0.1;
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
 
-/// A probe fitted by itself: gains by X, Y, Rz (per mm, mm, mrad), and slopes over gain by Z, Rx, Ry.
+/// A probe fitted by itself: gains by X, Y, Rz, and slopes over gain by Z, Rx, Ry, per [`UNIT`].
 #[derive(Clone, Copy, Debug)]
 struct Fitted {
     at: Vector,
@@ -188,7 +190,7 @@ impl Drawing {
             libm::log(eta / self.eta[probe]),
             libm::atan2(libm::sin(off), libm::cos(off)),
             turn / eta - self.lever_arm[probe],
-            a - FALL_PER_M * 1e-3,
+            a - FALL_PER_M * UNIT,
             b - a * place_y,
             c + a * place_x,
         ])
@@ -238,11 +240,12 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
         let (mut variance, mut left) = (f64::MIN_POSITIVE, 1.0);
         for _ in 0..ROUNDS {
             let column = |row: &FieldRow| {
-                let [q, rate] = [row.reference_mm, row.rate_mm_per_s].map(Vector3::from);
-                let v = Vector3::from(row.vertical) * 1e3;
+                let [x, y, rz, ..] = row.rate;
+                let parts = [row.reference, row.vertical, [x, y, rz]];
+                let [q, v, rate] = parts.map(|part| Vector3::from(part) / UNIT);
                 let by = |k: usize, of: &Vector3<f64>| at.fixed_rows::<3>(k).dot(of);
                 let (moved, grown) = (by(0, &q), 1.0 + by(3, &v));
-                let rest = row.signal_mm[probe] - grown * moved - by(6, &v) - by(9, &rate);
+                let rest = row.signal_m[probe] / UNIT - grown * moved - by(6, &v) - by(9, &rate);
                 let parts = [q * grown, v * moved, v, rate];
                 let parts = parts.iter().flatten().copied().chain([rest]);
                 SVector::<f64, { UNKNOWNS + 1 }>::from_iterator(parts)

@@ -64,8 +64,8 @@ impl Job<'_> {
         let first = self.first_phase()?;
         // Without six consecutive rows the residuals show the noise.
         let noise_m = probe_noise_m(&columns(self.dataset, self.stage));
-        let floor_mm = noise_m.map_or([f64::INFINITY; 3], |noise_m| noise_m.map(|m| m * 1e3));
-        let found = first.field.clone().finish(self.stage, floor_mm)?;
+        let floor_m = noise_m.unwrap_or([f64::INFINITY; 3]);
+        let found = first.field.clone().finish(self.stage, floor_m)?;
         let comparison = found.figures.comparison;
         if comparison.loses() {
             return Err(FieldFitError::NotCarried(Box::new(comparison)).into());

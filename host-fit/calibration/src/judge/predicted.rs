@@ -18,13 +18,13 @@ const RANGE_END: f64 = 1.645;
 /// deviation over mean.
 const MOTION_SPREAD: f64 = 0.7;
 
-/// The service that `[motion]` declares, with the white noise of the probes, mm.
+/// The service that `[motion]` declares, with the white noise of the probes, m.
 pub fn declared_service(
     stage: &Stage,
     parameters: &FieldParameters,
-    white_mm: [f64; 3],
+    white_m: [f64; 3],
 ) -> Option<Service> {
-    Service::new(parameters, white_mm, service_poses(service_range(stage)))
+    Service::new(parameters, white_m, service_poses(service_range(stage)))
 }
 
 /// The range of evenly spread poses with the rms that `[motion]` declares for service: half its range.
@@ -105,10 +105,10 @@ impl Validity {
     pub fn new(
         stage: &Stage,
         parameters: &FieldParameters,
-        white_mm: [f64; 3],
+        white_m: [f64; 3],
         covariance: &DMatrix<f64>,
     ) -> Option<Self> {
-        let service = &declared_service(stage, parameters, white_mm)?;
+        let service = &declared_service(stage, parameters, white_m)?;
         let is_followed = covariance.nrows() > COUNT;
         let [k, h] = stage.temperature.prior_per_k;
         let mut covariance = covariance.clone();
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn a_calibration_is_good_while_k_is_known_well_enough() {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
-        let white_mm = [5e-4; 3];
+        let white_m = [5e-7; 3];
         let parameters = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
         let within = |error_per_k: f64| {
             let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
@@ -208,14 +208,14 @@ mod tests {
                 let k = Coefficient::new(probe, 0).row();
                 covariance[(k, k)] = error_per_k * error_per_k;
             });
-            let found = Validity::new(&stage, &parameters, white_mm, &covariance);
+            let found = Validity::new(&stage, &parameters, white_m, &covariance);
             found.expect("a service").within_k
         };
         let (rough, fine) = (within(3e-4), within(1e-4));
         assert!((fine / rough - 3.0).abs() < 0.05, "{rough} {fine}");
         assert_eq!(within(0.0), 30.0);
         // At that distance the error of the gain makes errors of the limit.
-        let service = declared_service(&stage, &parameters, white_mm).expect("a service");
+        let service = declared_service(&stage, &parameters, white_m).expect("a service");
         let mut covariance = DMatrix::zeros(COUNT, COUNT);
         for probe in 0..3 {
             let mut parts = [0.0; 3];
@@ -227,7 +227,7 @@ mod tests {
         assert!((ratio - GOOD_MAX).abs() < 2e-3, "{ratio}");
         // Without a sensor the whole effect of temperature is an error.
         let blind = DMatrix::zeros(COUNT, COUNT);
-        let blind = Validity::new(&stage, &parameters, white_mm, &blind).expect("a service");
+        let blind = Validity::new(&stage, &parameters, white_m, &blind).expect("a service");
         assert!(
             !blind.is_followed && blind.within_k < 0.3 * rough,
             "{blind:?}"

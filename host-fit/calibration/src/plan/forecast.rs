@@ -15,8 +15,8 @@ use std::f64::consts::TAU;
 pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
     let sensors = SensorErrors::USUAL;
     let noise = Noise {
-        white_mm: [sensors.hall_m * 1e3; 3],
-        drift_mm: sensors.drift_per_root_s.map(|drift| drift * 1e3),
+        white_m: [sensors.hall_m; 3],
+        drift: sensors.drift_per_root_s,
     };
     let [x, y, rz, z, rx, ry] = stage.motion.axes.map(|axis| axis.service);
     Forecaster::new(
@@ -38,12 +38,12 @@ pub fn forecast(
 }
 
 /// Standard error of the change of a probe's signal by the acceleration of an axis, as the fast tone of a run
-/// determines it, mm per m/s2, rotations at 0.25 m: sigma sqrt(2 / N) / (B w^2), with the noise sigma of N rows and
+/// determines it, m per m/s2, rotations at 0.25 m: sigma sqrt(2 / N) / (B w^2), with the noise sigma of N rows and
 /// the rate w of the tone. Infinite without a tone.
 pub fn acceleration_error(run: &PlannedRun, axis: usize, period_s: f64) -> f64 {
     let rate = TAU * TONES_HZ[axis];
     let acceleration = ARMS_M[axis] * run.tones[axis] * rate * rate;
-    SensorErrors::USUAL.hall_m * 1e3 * (2.0 / run.rows(period_s) as f64).sqrt() / acceleration
+    SensorErrors::USUAL.hall_m * (2.0 / run.rows(period_s) as f64).sqrt() / acceleration
 }
 
 /// Rows of runs, sampled every `step_s`. Each run is a movement at a distance (mount, body) from T0 in K.
@@ -58,11 +58,10 @@ pub(super) fn rows(runs: &[(&PlannedRun, [f64; 2])], step_s: f64) -> Rows {
                 temperature_k: [*change_k; 3],
                 weight: 1.0,
                 time_s,
-                signal_mm: [0.0; 3],
+                signal_m: [0.0; 3],
                 vertical: [at[3][0], at[4][0], at[5][0]],
-                reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
-                rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
-                vertical_rate: [at[3][1], at[4][1], at[5][1]],
+                reference: [at[0][0], at[1][0], at[2][0]],
+                rate: at.map(|[_, rate, _]| rate),
                 acceleration_m_s2: std::array::from_fn(|axis| at[axis][2] * ARMS_M[axis]),
             }
         };

@@ -139,7 +139,7 @@ fn the_tones_of_a_usual_run_determine_what_acceleration_adds() {
     for (axis, (tone, error)) in expected.into_iter().enumerate() {
         assert!((run.tones[axis] / tone - 1.0).abs() < 0.01, "{axis}");
         let found = acceleration_error(&run, axis, STAGE.servo_period_s);
-        assert!((found - 1e3 * error).abs() < 0.01e-3, "{axis}: {found}");
+        assert!((found - error).abs() < 0.01e-6, "{axis}: {found}");
         peak = peak.max(ARMS_M[axis] * run.peaks(axis)[1]);
     }
     assert!((0.105..0.115).contains(&peak), "{peak}");

@@ -14,34 +14,34 @@ pub struct Block {
     pub time_s: f64,
     /// How many rows: the sum of their weights.
     pub rows: f64,
-    /// Signal less model of A, B, C, mm.
-    pub residual_mm: [f64; 3],
-    /// Derivatives of the model by X, Y (mm), Rz (mrad).
+    /// Signal less model of A, B, C, m.
+    pub residual_m: [f64; 3],
+    /// Derivatives of the model by X, Y (m), Rz (rad).
     pub by_pose: [[f64; 3]; 3],
     /// Derivatives by each probe's own parameters.
     pub by_parameter: [[f64; PER_PROBE]; 3],
-    /// Derivatives by the lag of the reference, mm/s.
+    /// Derivatives by the lag of the reference, m/s.
     pub by_lag: [f64; 3],
-    /// Derivatives by each probe's own lag, mm/s.
+    /// Derivatives by each probe's own lag, m/s.
     pub by_probe_lag: [f64; 3],
     /// Mean of [`FieldRow::acceleration_m_s2`].
     pub acceleration_m_s2: [f64; 6],
-    /// Derivatives by k and h of each probe, mm K.
+    /// Derivatives by k and h of each probe, m K.
     pub by_temperature: [[f64; 2]; 3],
 }
 
 impl Rows {
-    /// The blocks at given parameters and offsets of the reference (mm, mm, mrad) by movement.
+    /// The blocks at given parameters and offsets of the reference (m, m, rad) by movement.
     pub fn evaluate(
         &self,
         probes: &[Probe; 3],
         dynamics: &Dynamics,
-        offsets_mm: &[[f64; 3]],
+        offsets: &[[f64; 3]],
     ) -> Vec<Block> {
-        let in_movement = |(movement, &offset_mm): (usize, &[f64; 3])| {
-            self.evaluate_movement(movement, probes, dynamics, offset_mm)
+        let in_movement = |(movement, &offset): (usize, &[f64; 3])| {
+            self.evaluate_movement(movement, probes, dynamics, offset)
         };
-        offsets_mm
+        offsets
             .par_iter()
             .enumerate()
             .flat_map(in_movement)
@@ -54,43 +54,43 @@ impl Rows {
         movement: usize,
         probes: &[Probe; 3],
         dynamics: &Dynamics,
-        offset_mm: [f64; 3],
+        offset: [f64; 3],
     ) -> Vec<Block> {
         self.blocks[self.movements[movement].clone()]
             .par_iter()
             .with_min_len(64)
-            .map(|block| mean(&self.rows[block.clone()], probes, dynamics, offset_mm))
+            .map(|block| mean(&self.rows[block.clone()], probes, dynamics, offset))
             .collect()
     }
 
-    /// Signal less model of every row, mm, as in [`Rows::evaluate`].
-    pub fn residuals_mm(
+    /// Signal less model of every row, m, as in [`Rows::evaluate`].
+    pub fn residuals_m(
         &self,
         probes: &[Probe; 3],
         dynamics: &Dynamics,
-        offsets_mm: &[[f64; 3]],
+        offsets: &[[f64; 3]],
     ) -> Vec<[f64; 3]> {
         let in_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
             let residual = move |row: &FieldRow| {
                 [0, 1, 2].map(|k| {
-                    let [planar_mm, vertical] = row.pose(dynamics, k, offset);
+                    let [planar, vertical] = row.pose(dynamics, k, offset);
                     let gain = probes[k].gain(row.temperature_k[k]);
-                    let read_mm = row.signal_mm[k] - dynamics.added_mm(k, row.acceleration_m_s2);
-                    read_mm - gain * probes[k].signal_mm(planar_mm, vertical)
+                    let read_m = row.signal_m[k] - dynamics.added_m(k, row.acceleration_m_s2);
+                    read_m - gain * probes[k].signal_m(planar, vertical)
                 })
             };
             self.rows[range].par_iter().with_min_len(256).map(residual)
         };
-        let movements: Vec<_> = self.movement_rows().zip(offsets_mm).collect();
+        let movements: Vec<_> = self.movement_rows().zip(offsets).collect();
         movements.into_par_iter().flat_map(in_movement).collect()
     }
 }
 
-fn mean(rows: &[FieldRow], probes: &[Probe; 3], dynamics: &Dynamics, offset_mm: [f64; 3]) -> Block {
+fn mean(rows: &[FieldRow], probes: &[Probe; 3], dynamics: &Dynamics, offset: [f64; 3]) -> Block {
     let mut sum = Block {
         time_s: 0.0,
         rows: 0.0,
-        residual_mm: [0.0; 3],
+        residual_m: [0.0; 3],
         by_pose: [[0.0; 3]; 3],
         by_parameter: [[0.0; PER_PROBE]; 3],
         by_lag: [0.0; 3],
@@ -105,26 +105,25 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], dynamics: &Dynamics, offset_mm: 
             *sum += row.weight * x;
         }
         for (k, probe) in probes.iter().enumerate() {
-            let [planar_mm, vertical] = row.pose(dynamics, k, offset_mm);
+            let [planar, vertical] = row.pose(dynamics, k, offset);
             let Reading {
-                signal_mm,
+                signal_m,
                 by_pose,
                 by_vertical,
                 by_parameter,
-            } = probe.read(planar_mm, vertical);
+            } = probe.read(planar, vertical);
             let gain = probe.gain(row.temperature_k[k]);
-            let read_mm = row.signal_mm[k] - dynamics.added_mm(k, row.acceleration_m_s2);
-            sum.residual_mm[k] += row.weight * (read_mm - gain * signal_mm);
+            let read_m = row.signal_m[k] - dynamics.added_m(k, row.acceleration_m_s2);
+            sum.residual_m[k] += row.weight * (read_m - gain * signal_m);
             for (sum, temperature_k) in sum.by_temperature[k].iter_mut().zip(row.temperature_k[k]) {
-                *sum += row.weight * signal_mm * temperature_k;
+                *sum += row.weight * signal_m * temperature_k;
             }
             for (axis, by) in by_pose.into_iter().enumerate() {
                 let by = row.weight * gain * by;
                 sum.by_pose[k][axis] += by;
-                sum.by_lag[k] += by * row.rate_mm_per_s[axis];
+                sum.by_lag[k] += by * row.rate[axis];
                 let by_vertical = row.weight * gain * by_vertical[axis];
-                sum.by_probe_lag[k] -= by * row.rate_mm_per_s[axis];
-                sum.by_probe_lag[k] -= by_vertical * row.vertical_rate[axis];
+                sum.by_probe_lag[k] -= by * row.rate[axis] + by_vertical * row.rate[3 + axis];
             }
             for (sum, by) in sum.by_parameter[k].iter_mut().zip(by_parameter) {
                 *sum += row.weight * gain * by;
@@ -135,7 +134,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], dynamics: &Dynamics, offset_mm: 
     sum.time_s *= share;
     sum.acceleration_m_s2.iter_mut().for_each(|x| *x *= share);
     for k in 0..3 {
-        sum.residual_mm[k] *= share;
+        sum.residual_m[k] *= share;
         sum.by_lag[k] *= share;
         sum.by_probe_lag[k] *= share;
         sum.by_pose[k].iter_mut().for_each(|x| *x *= share);

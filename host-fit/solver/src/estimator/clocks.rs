@@ -2,7 +2,7 @@
 //! together with all that a stage as designed may differ in.
 
 use super::dynamics::Dynamics;
-use super::noise::{USUAL_DRIFT_MM, white_mm};
+use super::noise::{USUAL_DRIFT, white_m};
 use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
 use super::probe::probes;
 use super::rows::Rows;
@@ -127,16 +127,16 @@ impl<'s> Alignment<'s> {
             rows,
             places: self.places,
             noise: Noise {
-                white_mm: white_mm(
+                white_m: white_m(
                     rows,
                     &probes,
                     &Dynamics::default(),
                     &point.offsets,
                     self.stage,
                 ),
-                drift_mm: USUAL_DRIFT_MM,
+                drift: USUAL_DRIFT,
             },
-            resets_mm: None,
+            resets: None,
             faults: &[],
         }
     }

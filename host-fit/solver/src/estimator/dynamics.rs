@@ -17,11 +17,11 @@ pub const ARM_M: f64 = 0.25;
 pub const ARMS_M: [f64; 6] = [1.0, 1.0, ARM_M, 1.0, ARM_M, ARM_M];
 /// Standard deviation of the lag of a probe behind the others before a log is seen, s.
 pub const PROBE_LAG_S: f64 = 1e-3;
-/// Standard deviation of a reading's change by acceleration before a log is seen, mm per m/s2. A motor coil 5 cm away has
-/// 7e-3, an arm with a resonance at 120 Hz 1e-3 to 4e-3.
-pub const PER_ACCELERATION: f64 = 3e-3;
-/// A log that leaves a smaller standard error, mm per m/s2, shows what acceleration adds. Without that it is held at zero.
-pub const ACCELERATION_ERROR_MAX: f64 = 1e-3;
+/// Standard deviation of a reading's change by acceleration before a log is seen, m per m/s2. A motor coil 5 cm away has
+/// 7e-6, an arm with a resonance at 120 Hz 1e-6 to 4e-6.
+pub const PER_ACCELERATION: f64 = 3e-6;
+/// A log that leaves a smaller standard error, m per m/s2, shows what acceleration adds. Without that it is held at zero.
+pub const ACCELERATION_ERROR_MAX: f64 = 1e-6;
 
 /// Lags, and changes of the readings by acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,9 +30,9 @@ pub struct Dynamics {
     pub lag_s: f64,
     /// Lag of A, B, C behind their mean, s.
     pub probe_lag_s: [f64; 3],
-    /// Change of the readings of A, B, C by the acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, mm
+    /// Change of the readings of A, B, C by the acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, m
     /// per m/s2.
-    pub mm_per_m_s2: [[f64; 6]; 3],
+    pub m_per_m_s2: [[f64; 6]; 3],
 }
 
 impl Dynamics {
@@ -42,15 +42,15 @@ impl Dynamics {
         Self {
             lag_s: values[LAG],
             probe_lag_s: [a, b, -a - b],
-            mm_per_m_s2: [0, 1, 2]
+            m_per_m_s2: [0, 1, 2]
                 .map(|probe| std::array::from_fn(|axis| values[column(probe, axis)])),
         }
     }
 
-    /// What acceleration adds to the reading of a probe, mm.
+    /// What acceleration adds to the reading of a probe, m.
     #[inline(always)]
-    pub fn added_mm(&self, probe: usize, acceleration_m_s2: [f64; 6]) -> f64 {
-        let pairs = self.mm_per_m_s2[probe].iter().zip(acceleration_m_s2);
+    pub fn added_m(&self, probe: usize, acceleration_m_s2: [f64; 6]) -> f64 {
+        let pairs = self.m_per_m_s2[probe].iter().zip(acceleration_m_s2);
         pairs.fold(0.0, |sum, (by, acceleration)| sum + by * acceleration)
     }
 }
@@ -62,7 +62,7 @@ pub struct MotionFit {
     pub dynamics: Dynamics,
     /// Covariance of the lags of A, B, C behind their mean, s2.
     pub probe_lag_covariance: Matrix3<f64>,
-    /// Covariance of the changes of A, B, C by the acceleration of each axis, (mm per m/s2)^2.
+    /// Covariance of the changes of A, B, C by the acceleration of each axis, (m per m/s2)^2.
     pub acceleration_covariance: [Matrix3<f64>; 6],
     /// Whether the log shows the changes by acceleration: the limit is [`ACCELERATION_ERROR_MAX`].
     pub shows_acceleration: bool,
@@ -129,7 +129,7 @@ impl MotionFit {
         [0, 1, 2].map(|k| self.probe_lag_covariance[(k, k)].sqrt())
     }
 
-    /// Standard errors of [`Dynamics::mm_per_m_s2`].
+    /// Standard errors of [`Dynamics::m_per_m_s2`].
     pub fn acceleration_errors(&self) -> [[f64; 6]; 3] {
         [0, 1, 2].map(|probe| {
             let variance = |axis: usize| self.acceleration_covariance[axis][(probe, probe)];
@@ -159,10 +159,9 @@ impl MotionFit {
     pub fn correction(&self, parameters: &FieldParameters) -> Option<[Matrix3<f64>; 2]> {
         let (readings, poses) = jacobian(parameters)?;
         let k =
-            Matrix3::from_fn(|probe, axis| self.dynamics.mm_per_m_s2[probe][axis] * ARMS_M[axis]);
+            Matrix3::from_fn(|probe, axis| self.dynamics.m_per_m_s2[probe][axis] * ARMS_M[axis]);
         let lags = Matrix3::from_diagonal(&self.dynamics.probe_lag_s.into());
-        // Readings are in mm, rotations in mrad.
-        Some([poses * k * -1e-3, poses * lags * readings])
+        Some([-poses * k, poses * lags * readings])
     }
 
     /// Variances that motion adds to X, Y, Rz in service (m2, m2, rad2): speeds and accelerations of the axes are
@@ -177,7 +176,7 @@ impl MotionFit {
         let (readings, poses) = jacobian(parameters)?;
         let mut sum = Matrix3::zeros();
         for (axis, acceleration) in motion.acceleration.into_iter().enumerate() {
-            let known = self.dynamics.mm_per_m_s2.map(|by| by[axis]);
+            let known = self.dynamics.m_per_m_s2.map(|by| by[axis]);
             let known = if is_corrected && axis < 3 {
                 [0.0; 3]
             } else {
@@ -185,7 +184,7 @@ impl MotionFit {
             };
             let known = Vector3::from(known);
             let k = self.acceleration_covariance[axis] + known * known.transpose();
-            sum += poses * k * poses.transpose() * (1e-3 * ARMS_M[axis] * acceleration).powi(2);
+            sum += poses * k * poses.transpose() * (ARMS_M[axis] * acceleration).powi(2);
         }
         let known = if is_corrected {
             [0.0; 3]

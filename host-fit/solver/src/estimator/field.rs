@@ -3,7 +3,7 @@
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::error::FieldFitError;
-use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
+use super::noise::{USUAL_DRIFT, drift, white_m, white_only};
 use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
@@ -95,8 +95,8 @@ pub fn fit_field(
 ) -> Result<FieldFit, FieldFitError> {
     let rows = Rows::new(dataset, selected).into();
     let fit = WhiteFit::new(dataset, rows, stage, start)?;
-    let floor_mm = fit.noise.white_mm;
-    fit.finish(stage, floor_mm)
+    let floor_m = fit.noise.white_m;
+    fit.finish(stage, floor_m)
 }
 
 /// The first phase of a fit: under white noise, each row with its weight.
@@ -111,7 +111,7 @@ pub struct WhiteFit {
     sensors: Sensors,
     at: Point,
     noise: Noise,
-    resets_mm: Option<[f64; 3]>,
+    resets: Option<[f64; 3]>,
     iterations: u32,
     /// Whether the log determines what acceleration adds to the readings; otherwise that is held at zero.
     shows_acceleration: bool,
@@ -153,7 +153,7 @@ impl WhiteFit {
             sensors,
             places,
             noise: white_only([1.0; 3]),
-            resets_mm: stage.resets_mm(),
+            resets: stage.reset_sd,
             iterations: 0,
             shows_acceleration: false,
             start: *start,
@@ -204,11 +204,11 @@ impl WhiteFit {
         Ok(fit)
     }
 
-    /// The rest of [`fit_field`]: under the noise that the residuals show; `floor_mm` is the noise of the probes in service.
+    /// The rest of [`fit_field`]: under the noise that the residuals show; `floor_m` is the noise of the probes in service.
     ///
     /// # Errors
     /// See [`FieldFitError`].
-    pub fn finish(mut self, stage: &Stage, floor_mm: [f64; 3]) -> Result<FieldFit, FieldFitError> {
+    pub fn finish(mut self, stage: &Stage, floor_m: [f64; 3]) -> Result<FieldFit, FieldFitError> {
         let mut covariance = self.covariance(&self.normal()?)?;
         // White noise alone makes the errors too small, never too large: what fails here, fails.
         let early = self.comparison(stage, &self.posterior(&covariance, self.noise));
@@ -216,19 +216,19 @@ impl WhiteFit {
             return Err(FieldFitError::NotCarried(Box::new(early)));
         }
         // What the parameters took of the drift depends on how much there is of it.
-        self.noise.drift_mm = USUAL_DRIFT_MM;
+        self.noise.drift = USUAL_DRIFT;
         let mut normal = self.normal()?;
         for _ in 0..NOISE_ROUNDS {
             covariance = self.covariance(&normal)?;
-            let white_mm = self.white_mm(stage);
+            let white_m = self.white_m(stage);
             let blocks = self.rows.evaluate(
                 &probes(&self.parameters()),
                 &self.dynamics(),
                 &self.at.offsets,
             );
             self.noise = Noise {
-                white_mm,
-                drift_mm: drift_mm(&self.rows, &blocks, white_mm, &covariance),
+                white_m,
+                drift: drift(&self.rows, &blocks, white_m, &covariance),
             };
             drop(blocks);
             // On a faulty log it ends where no step gains more: the diagnosis goes on from there.
@@ -243,7 +243,7 @@ impl WhiteFit {
         let motion = MotionFit::new(self.at.values.as_slice(), &covariance, shows_acceleration);
         // Residuals show it better where the reference adds nothing.
         let floor = Noise {
-            white_mm: [0, 1, 2].map(|k| floor_mm[k].min(self.noise.white_mm[k])),
+            white_m: [0, 1, 2].map(|k| floor_m[k].min(self.noise.white_m[k])),
             ..self.noise
         };
         let (posterior, temperature) = self.with_temperature(covariance, floor);
@@ -261,7 +261,7 @@ impl WhiteFit {
                 residuals: 3 * counted.saturating_sub(rows.movements.len()),
             },
             noise: self.noise,
-            planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
+            planar_range: rows.planar_range,
             vertical_range: rows.vertical_range,
         };
         Ok(FieldFit {
@@ -292,10 +292,10 @@ impl WhiteFit {
                 temperature.per_mk[of.probe][of.sensor] += 1e-3 * change;
             }
         }
-        let (rows, white_mm) = (&self.rows.rows, self.noise.white_mm[0]);
-        let squares = rows.iter().map(|row| row.signal_mm[0] * row.signal_mm[0]);
+        let (rows, white_m) = (&self.rows.rows, self.noise.white_m[0]);
+        let squares = rows.iter().map(|row| row.signal_m[0] * row.signal_m[0]);
         let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
-        let signal_to_noise = mean_square / (white_mm * white_mm);
+        let signal_to_noise = mean_square / (white_m * white_m);
         self.sensors.complete(&mut covariance, signal_to_noise);
         let parameters_only = self.posterior(&covariance, floor);
         let posterior = match temperature.is_used() {
@@ -323,7 +323,7 @@ impl WhiteFit {
             rows: &self.rows,
             places: self.places,
             noise: self.noise,
-            resets_mm: self.resets_mm,
+            resets: self.resets,
             faults: &[],
         }
     }
@@ -345,13 +345,13 @@ impl WhiteFit {
 
     fn comparison(&self, stage: &Stage, posterior: &Posterior) -> Comparison {
         let rows = &self.rows;
-        let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
+        let ranges = (rows.planar_range, rows.vertical_range);
         Comparison::new(&self.parameters(), posterior, &self.start, stage, ranges)
     }
 
-    fn white_mm(&self, stage: &Stage) -> [f64; 3] {
+    fn white_m(&self, stage: &Stage) -> [f64; 3] {
         let probes = probes(&self.parameters());
-        white_mm(
+        white_m(
             &self.rows,
             &probes,
             &self.dynamics(),
@@ -362,14 +362,14 @@ impl WhiteFit {
 
     fn weights_by(&self, loss: Loss) -> Vec<f64> {
         let probes = probes(&self.parameters());
-        let residuals_mm = self
+        let residuals_m = self
             .rows
-            .residuals_mm(&probes, &self.dynamics(), &self.at.offsets);
-        loss.weights(residuals_mm, self.rows.movement_rows())
+            .residuals_m(&probes, &self.dynamics(), &self.at.offsets);
+        loss.weights(residuals_m, self.rows.movement_rows())
     }
 
     fn under_white_noise(&mut self, stage: &Stage, limits: Limits) -> Result<(), FieldFitError> {
-        self.noise = white_only(self.white_mm(stage));
+        self.noise = white_only(self.white_m(stage));
         if !self.shows_acceleration {
             let open = unknowns(&self.places, self.sensors.deviations(), PER_ACCELERATION);
             let covariance = open.covariance(&self.normal()?);

@@ -48,7 +48,7 @@ impl Forecaster {
         Some(Self {
             parameters: *parameters,
             noise: *noise,
-            service: Service::new(parameters, noise.white_mm, service_poses(service))?,
+            service: Service::new(parameters, noise.white_m, service_poses(service))?,
         })
     }
 
@@ -70,10 +70,10 @@ impl Forecaster {
         distances_k: &[[f64; 2]],
     ) -> Option<TemperatureForecast> {
         let mut covariance = self.covariance(rows, weight, sensors.deviations())?;
-        let amplitude_mm = rows.rows.iter().map(|row| row.reference_mm[1].abs());
-        let white_mm = self.noise.white_mm[1];
+        let amplitude_m = rows.rows.iter().map(|row| row.reference[1].abs());
+        let white_m = self.noise.white_m[1];
         // Of a sine.
-        let rms_to_noise = amplitude_mm.fold(0.0, f64::max) / (f64::sqrt(2.0) * white_mm);
+        let rms_to_noise = amplitude_m.fold(0.0, f64::max) / (f64::sqrt(2.0) * white_m);
         sensors.complete(&mut covariance, rms_to_noise * rms_to_noise);
         let posterior = Posterior::new(&covariance, &self.parameters, &self.noise);
         let posterior = posterior.with_temperature(&covariance);
@@ -88,16 +88,15 @@ impl Forecaster {
     }
 
     fn covariance(&self, rows: &Rows, weight: f64, temperature: [f64; 2]) -> Option<DMatrix<f64>> {
-        let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
-        let mut blocks =
-            rows.evaluate(&probes(&self.parameters), &Dynamics::default(), &offsets_mm);
+        let offsets = vec![[0.0; 3]; rows.movements.len()];
+        let mut blocks = rows.evaluate(&probes(&self.parameters), &Dynamics::default(), &offsets);
         blocks.iter_mut().for_each(|block| block.rows *= weight);
         let places = self.parameters.places;
         let equations = FieldEquations {
             rows,
             places,
             noise: self.noise,
-            resets_mm: None,
+            resets: None,
             faults: &[],
         };
         let normal = equations.sum_blocks(&blocks);

@@ -162,10 +162,7 @@ fn regression(problem: &Problem) -> Option<Parameters> {
         let rows = &problem.rows.rows[movement];
         let (mut of_q, mut of_s, mut weights) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         for row in rows {
-            let (q, s) = (
-                Vector3::from(row.reference_mm),
-                Vector3::from(row.signal_mm),
-            );
+            let (q, s) = (Vector3::from(row.reference), Vector3::from(row.signal_m));
             of_q += q * row.weight;
             of_s += s * row.weight;
             weights += row.weight;
@@ -221,7 +218,7 @@ pub fn zero_deviations(problem: &Problem, parameters: &Parameters) -> Vec<ZeroDe
             }
             weights += row.weight;
         }
-        let mean = sum.map(|sum| sum / weights * 1e-6);
+        let mean = sum.map(|sum| sum / weights);
         let range = &problem.stage.search.delta_m;
         zeros[number] = ZeroDeviation::from_mean_error(parameters, mean, range);
     }

@@ -10,7 +10,7 @@ use runtime::matrix::{inverse, to_rows};
 /// The point (G, r) of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearPoint {
-    /// Gain: pose (mm, mm, mrad) per mm of corrected signal, G = PM^-1 diag(1/eta).
+    /// Gain: pose (m, m, rad) per m of corrected signal, G = PM^-1 diag(1/eta).
     pub gain: Matrix3<f64>,
     /// Slopes over eta of each probe: (a, b, c) / eta in 1/m, 1/rad, 1/rad for Model (31).
     pub ratios: [[f64; 3]; 3],

@@ -16,18 +16,18 @@ const SPAN_S: f64 = 1.0;
 /// A span shorter than this part of [`SPAN_S`] is left out.
 const PART_MIN: f64 = 0.5;
 
-/// White noise of the probes A, B, C, mm: from second differences of the residuals, which have six times the
+/// White noise of the probes A, B, C, m: from second differences of the residuals, which have six times the
 /// variance of the noise. It is at least the rounding of the codes.
 /// Rows below half weight are left out.
-pub fn white_mm(
+pub fn white_m(
     rows: &Rows,
     probes: &[Probe; 3],
     dynamics: &Dynamics,
-    offsets_mm: &[[f64; 3]],
+    offsets: &[[f64; 3]],
     stage: &Stage,
 ) -> [f64; 3] {
-    let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-    let residuals = rows.residuals_mm(probes, dynamics, offsets_mm);
+    let least_m = stage.hall.m_per_count / 12f64.sqrt();
+    let residuals = rows.residuals_m(probes, dynamics, offsets);
     let mut noise = SecondDifferences::default();
     for movement in rows.movement_rows() {
         let triples = residuals[movement.clone()].windows(3);
@@ -37,14 +37,14 @@ pub fn white_mm(
             }
         }
     }
-    noise.deviations().map(|white| white.max(least_mm))
+    noise.deviations().map(|white| white.max(least_m))
 }
 
 /// Means over a span of about [`SPAN_S`], as poses.
 struct Span {
     rows: f64,
     time_s: f64,
-    /// Error of the reference, mm, mm, mrad.
+    /// Error of the reference, m, m, rad.
     error: [f64; 3],
     /// Its variance by white noise of one row.
     white: [f64; 3],
@@ -52,27 +52,27 @@ struct Span {
     by_unknown: [[f64; UNKNOWNS]; 3],
 }
 
-/// Usual walk of a reference in a second in X, Y, Rz: mm, mm, mrad.
-pub const USUAL_DRIFT_MM: [f64; 3] = [1e-4; 3];
+/// Usual walk of a reference in a second in X, Y, Rz: m, m, rad.
+pub const USUAL_DRIFT: [f64; 3] = [1e-7; 3];
 /// Standard deviation of the logarithm of a walk, before a log is seen: a factor of two.
 pub const DRIFT_SPREAD: f64 = 0.7;
 
-/// The reference's walk in X, Y, Rz, per root of a second (mm, mm, mrad): from differences
+/// The reference's walk in X, Y, Rz, per root of a second (m, m, rad): from differences
 /// between means of neighbouring spans of a second, with what the fitted parameters took of them
 /// (by their `covariance`) put back.
 ///
 /// A short log has few spans and determines the walk within a factor of two. Standard errors
 /// are honest on average with the mean of the walk's variance over all values that the spans
 /// allow, not with the most likely one, which is often zero.
-pub fn drift_mm(
+pub fn drift(
     rows: &Rows,
     blocks: &[Block],
-    white_mm: [f64; 3],
+    white_m: [f64; 3],
     covariance: &DMatrix<f64>,
 ) -> [f64; 3] {
     let mut differences = [const { Vec::new() }; 3];
     for movement in &rows.movements {
-        let spans = spans(&blocks[movement.clone()], white_mm);
+        let spans = spans(&blocks[movement.clone()], white_m);
         for pair in spans.windows(2) {
             let (a, b) = (&pair[0], &pair[1]);
             for (axis, differences) in differences.iter_mut().enumerate() {
@@ -89,7 +89,7 @@ pub fn drift_mm(
             }
         }
     }
-    [0, 1, 2].map(|axis| mean_walk(&differences[axis], USUAL_DRIFT_MM[axis]))
+    [0, 1, 2].map(|axis| mean_walk(&differences[axis], USUAL_DRIFT[axis]))
 }
 
 /// The difference between two spans.
@@ -136,19 +136,19 @@ fn quadratic(covariance: &DMatrix<f64>, by: &[f64; UNKNOWNS]) -> f64 {
     sum
 }
 
-fn spans(blocks: &[Block], white_mm: [f64; 3]) -> Vec<Span> {
+fn spans(blocks: &[Block], white_m: [f64; 3]) -> Vec<Span> {
     let start_s = blocks.first().map_or(0.0, |block| block.time_s);
     let number = |block: &Block| ((block.time_s - start_s) / SPAN_S).floor() as i64;
     let mut spans: Vec<Span> = blocks
         .chunk_by(|a, b| number(a) == number(b))
-        .filter_map(|blocks| span(blocks, white_mm))
+        .filter_map(|blocks| span(blocks, white_m))
         .collect();
     let most = spans.iter().map(|span| span.rows).fold(0.0, f64::max);
     spans.retain(|span| span.rows >= PART_MIN * most);
     spans
 }
 
-fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
+fn span(blocks: &[Block], white_m: [f64; 3]) -> Option<Span> {
     let mut sum = Span {
         rows: 0.0,
         time_s: 0.0,
@@ -162,10 +162,10 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
         sum.rows += block.rows;
         sum.time_s += block.rows * block.time_s;
         for (axis, row) in by_probe.iter().enumerate() {
-            for (probe, per_mm) in row.iter().enumerate() {
-                let weight = per_mm * block.rows;
-                let white = per_mm * white_mm[probe];
-                sum.error[axis] += weight * block.residual_mm[probe];
+            for (probe, by) in row.iter().enumerate() {
+                let weight = by * block.rows;
+                let white = by * white_m[probe];
+                sum.error[axis] += weight * block.residual_m[probe];
                 sum.white[axis] += block.rows * white * white;
                 for (sum, x) in sum.by_unknown[axis].iter_mut().zip(&columns[probe]) {
                     *sum += weight * x;
@@ -184,10 +184,10 @@ fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
 }
 
 /// The noise of a log before anything is known of the drift.
-pub fn white_only(white_mm: [f64; 3]) -> Noise {
+pub fn white_only(white_m: [f64; 3]) -> Noise {
     Noise {
-        white_mm,
-        drift_mm: [0.0; 3],
+        white_m,
+        drift: [0.0; 3],
     }
 }
 
@@ -197,7 +197,7 @@ mod tests {
 
     /// Differences as large as a walk of this size makes them on average.
     fn differences(count: usize, walk: f64) -> Vec<Difference> {
-        let white = 2e-9;
+        let white = 2e-15;
         let one = |_| Difference {
             square: white + walk * walk / 1.5,
             white,
@@ -208,16 +208,16 @@ mod tests {
 
     #[test]
     fn many_spans_give_the_walk_and_few_an_allowance_for_what_they_leave_open() {
-        for walk in [3e-5, 1e-4, 1e-3] {
-            let found = |count| mean_walk(&differences(count, walk), 1e-4) / walk;
+        for walk in [3e-8, 1e-7, 1e-6] {
+            let found = |count| mean_walk(&differences(count, walk), 1e-7) / walk;
             let (many, few) = (found(2000), found(7));
             assert!((0.95..1.05).contains(&many), "{walk}: {many}");
             // Towards the usual walk.
             assert!((0.8..2.2).contains(&few), "{walk}: {few}");
         }
         // Spans that show no walk don't show that there is none.
-        let still = mean_walk(&differences(7, 0.0), 1e-4);
-        assert!((2e-5..1e-4).contains(&still), "{still}");
-        assert!(mean_walk(&[], 1e-4) > 1e-4);
+        let still = mean_walk(&differences(7, 0.0), 1e-7);
+        assert!((2e-8..1e-7).contains(&still), "{still}");
+        assert!(mean_walk(&[], 1e-7) > 1e-7);
     }
 }

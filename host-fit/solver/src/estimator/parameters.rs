@@ -3,7 +3,8 @@
 use super::dynamics::lag_prior;
 use super::temperature::Coefficient;
 use super::terms::{
-    CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
+    CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPE_UNIT_M, SHAPES, SLOPES, TERMS, THETA,
+    shape, shape_list,
 };
 use super::whiten::{ACCELERATIONS, PROBE_LAGS, UNKNOWNS};
 use crate::estimator::gauss_newton::Unknowns;
@@ -230,10 +231,10 @@ fn sensitivity(values: &[f64; PER_PROBE]) -> Sensitivity<f64> {
 /// Factors from the coefficients of p in mm to the decoder's coefficients, for u, w and p in units of `m_per_unit`
 /// and for zr = eta z in place of z.
 fn shape_scale(eta: f64, m_per_unit: f64) -> [f64; SHAPE] {
-    let mm_per_unit = m_per_unit * 1e3;
+    let per_unit = m_per_unit / SHAPE_UNIT_M;
     std::array::from_fn(|place| {
         let [u, w, z] = TERMS[SHAPES + place].powers.map(i32::from);
-        powi(mm_per_unit, u + w) / mm_per_unit * powi(1.0 / eta, z)
+        powi(per_unit, u + w) / per_unit * powi(1.0 / eta, z)
     })
 }
 
@@ -257,8 +258,8 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
     ([x, y], [[by(-c, x), -a * share], [by(b, y), a * share]])
 }
 
-/// Standard deviation of a temperature coefficient (1/K) or a change by acceleration (mm per m/s2) that stays at its prior.
-pub const HELD: f64 = 1e-9;
+/// Standard deviation of a temperature coefficient (1/K) or a change by acceleration (m per m/s2) that stays at its prior.
+pub const HELD: f64 = 1e-12;
 
 /// All unknowns with their prior: `temperature` are the prior standard deviations of k and h, `acceleration` of the
 /// changes by acceleration.
@@ -334,9 +335,7 @@ mod tests {
             let v = [250e-6 * v[0], 500e-6 * v[1], 500e-6 * v[2]];
             let constants = parameters.constants(M_PER_CODE).expect("sound");
             let probes = probes(&parameters);
-            let signal = [0, 1, 2].map(|k| {
-                probes[k].signal_mm(q.map(|x| x * 1e3), v) * 1e-3 / M_PER_CODE
-            });
+            let signal = probes.map(|probe| probe.signal_m(q, v) / M_PER_CODE);
             let exact = constants.decode(signal, &VerticalPose::from_array(v)).to_array();
             let [x, y, rz] = nano(exact, q);
             prop_assert!(x < 10.0 && y < 10.0 && rz < 15.0, "{x} {y} {rz}");

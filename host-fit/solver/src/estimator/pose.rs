@@ -12,7 +12,7 @@ use super::terms::CARRY;
 use crate::estimator::gauss_newton::{Equations, Normal, Point};
 use crate::estimator::model::COUNT;
 use crate::estimator::paper::Parameters;
-use crate::estimator::problem::Problem;
+use crate::estimator::problem::{Problem, UNIT};
 use hallstage_input::stage::Stage;
 use runtime::matrix::{inverse, to_rows};
 use std::ops::Range;
@@ -30,8 +30,7 @@ pub const ERROR: usize = COUNT + 3;
 /// A row with phi below this part of eta is next to a pole.
 pub const SHARE_MIN: f64 = 0.05;
 
-/// The error of a row's pose in the last column, and the derivatives of the decoded pose: um, um, urad
-/// per SI unit.
+/// The error of a row's pose in the last column, and the derivatives of the decoded pose, in [`UNIT`].
 pub type Columns = [[f64; COLUMNS]; 3];
 
 /// A model of the paper, ready to decode rows.
@@ -40,16 +39,16 @@ pub struct Decoder {
     probes: [Probe; 3],
     eta: [f64; 3],
     slopes: [[f64; 3]; 3],
-    /// Rows of PM^-1: um, um, urad per mm.
+    /// Rows of PM^-1.
     inverse: [[f64; 3]; 3],
 }
 
 /// A decoded row.
 struct Decoded {
-    /// mm, mm, mrad.
-    planar_mm: [f64; 3],
+    /// X, Y, Rz: m, m, rad.
+    planar: [f64; 3],
     phi: [f64; 3],
-    /// Reference less pose: um, um, urad.
+    /// Reference less pose: m, m, rad.
     error: [f64; 3],
 }
 
@@ -63,7 +62,7 @@ impl Decoder {
             probes: probes(&FieldParameters::from_model_31(parameters, stage)),
             eta,
             slopes: parameters.slopes(),
-            inverse: to_rows(&(inverse * 1e3)),
+            inverse: to_rows(&inverse),
         })
     }
 
@@ -76,18 +75,18 @@ impl Decoder {
         if (0..3).any(is_near_pole) {
             return None;
         }
-        let along_mm = [0, 1, 2].map(|k| row.signal_mm[k] / phi[k]);
-        let pose = self
+        let along_m = [0, 1, 2].map(|k| row.signal_m[k] / phi[k]);
+        let planar = self
             .inverse
-            .map(|row| (row[0] * along_mm[0] + row[1] * along_mm[1]) + row[2] * along_mm[2]);
+            .map(|row| (row[0] * along_m[0] + row[1] * along_m[1]) + row[2] * along_m[2]);
         Some(Decoded {
-            planar_mm: pose.map(|x| 1e-3 * x),
+            planar,
             phi,
-            error: [0, 1, 2].map(|axis| 1e3 * row.reference_mm[axis] - pose[axis]),
+            error: [0, 1, 2].map(|axis| row.reference[axis] - planar[axis]),
         })
     }
 
-    /// The reference less the decoded pose, no offset taken off: um, um, urad. `None` next to a pole.
+    /// The reference less the decoded pose, no offset taken off: m, m, rad. `None` next to a pole.
     pub fn error(&self, row: &FieldRow) -> Option<[f64; 3]> {
         Some(self.decode(row)?.error)
     }
@@ -95,26 +94,18 @@ impl Decoder {
     /// The error with its derivatives. `None` next to a pole.
     #[inline(always)]
     pub fn columns(&self, row: &FieldRow) -> Option<Columns> {
-        let Decoded {
-            planar_mm,
-            phi,
-            error,
-        } = self.decode(row)?;
+        let Decoded { planar, phi, error } = self.decode(row)?;
         let mut columns = [[0.0; COLUMNS]; 3];
         for (k, probe) in self.probes.iter().enumerate() {
-            let read = probe.read(planar_mm, row.vertical);
-            let by_planar = read.by_pose.iter().zip(row.rate_mm_per_s);
-            let by_vertical = read.by_vertical.iter().zip(row.vertical_rate);
-            let rate_mm_per_s: f64 = by_planar
-                .chain(by_vertical)
-                .map(|(by, rate)| by * rate)
-                .sum();
+            let read = probe.read(planar, row.vertical);
+            let by = read.by_pose.iter().chain(&read.by_vertical);
+            let rate_m_s: f64 = by.zip(row.rate).map(|(by, rate)| by * rate).sum();
             for (axis, column) in columns.iter_mut().enumerate() {
-                let to_pose = -self.inverse[axis][k] / phi[k];
+                let to_pose = -self.inverse[axis][k] / (phi[k] * UNIT);
                 for (term, by) in read.by_parameter[..CARRY].iter().enumerate() {
                     column[3 * term + k] = to_pose * by;
                 }
-                let by_lag = -to_pose * rate_mm_per_s;
+                let by_lag = -to_pose * rate_m_s;
                 match k {
                     2 => {
                         column[PROBE_LAGS] -= by_lag;
@@ -125,8 +116,8 @@ impl Decoder {
             }
         }
         for (axis, column) in columns.iter_mut().enumerate() {
-            column[LAG] = -1e3 * row.rate_mm_per_s[axis];
-            column[ERROR] = error[axis];
+            column[LAG] = -row.rate[axis] / UNIT;
+            column[ERROR] = error[axis] / UNIT;
         }
         Some(columns)
     }

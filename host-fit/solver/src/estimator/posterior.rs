@@ -9,9 +9,9 @@ use crate::estimator::model;
 use nalgebra::{DMatrix, Matrix3};
 use runtime::matrix::{from_rows, inverse, to_rows};
 
-/// Error of a probe's reading in service by the form of the model, rms, mm: mean over simulated stages,
+/// Error of a probe's reading in service by the form of the model, rms, m: mean over simulated stages,
 /// each fitted to 30 s without noise and drift; 16 to 46 nm.
-pub const FORM_MM: f64 = 25e-6;
+pub const FORM_M: f64 = 25e-9;
 
 /// Correlations above this are shown: the parameters stand in for each other.
 pub const CORRELATION_SHOWN: f64 = 0.95;
@@ -25,8 +25,8 @@ pub struct Posterior {
     /// Which parameters these are, by their places among the 81 and k and h.
     pub determined: Vec<usize>,
     parameters: FieldParameters,
-    /// Noise of the probes that makes the noise floor, mm.
-    pub white_mm: [f64; 3],
+    /// Noise of the probes that makes the noise floor, m.
+    pub white_m: [f64; 3],
 }
 
 /// What is to be expected of a pose, as covariances of X, Y, Rz in m, m, rad.
@@ -43,7 +43,7 @@ pub struct PoseUncertainty {
 pub struct PoseErrors {
     /// Per error of each parameter.
     pub by_parameter: [[f64; COUNT]; 3],
-    /// Per mm of error of each probe's signal.
+    /// Per m of error of each probe's signal.
     pub by_signal: [[f64; 3]; 3],
 }
 
@@ -51,9 +51,8 @@ impl PoseErrors {
     /// At the pose `planar` (m, m, rad), `vertical` (m, rad, rad); `None` where the probes don't
     /// determine it.
     pub(super) fn new(probes: &[Probe; 3], planar: [f64; 3], vertical: [f64; 3]) -> Option<Self> {
-        let planar_mm = planar.map(|x| x * 1e3);
-        let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
-        let by_signal = to_rows(&(inverse(&from_rows(&read.map(|r| r.by_pose)))? * 1e-3));
+        let read = probes.map(|probe| probe.read(planar, vertical));
+        let by_signal = to_rows(&inverse(&from_rows(&read.map(|r| r.by_pose)))?);
         let by_parameter = by_signal.map(|row| {
             std::array::from_fn(|k| {
                 let probe = k / PER_PROBE;
@@ -114,7 +113,7 @@ impl Posterior {
             determined: (0..covariance.nrows()).collect(),
             covariance,
             parameters: *parameters,
-            white_mm: noise.white_mm,
+            white_m: noise.white_m,
         }
     }
 
@@ -128,7 +127,7 @@ impl Posterior {
             covariance,
             determined,
             parameters: *parameters,
-            white_mm: [0.0; 3],
+            white_m: [0.0; 3],
         }
     }
 
@@ -209,13 +208,13 @@ impl Posterior {
         let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
         let covariance = self.covariance.view((0, 0), (COUNT, COUNT));
         let systematic = &by_parameter * covariance * by_parameter.transpose();
-        let by_probes = |errors_mm: [f64; 3]| {
-            let by = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * errors_mm[k]);
+        let by_probes = |errors_m: [f64; 3]| {
+            let by = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * errors_m[k]);
             by * by.transpose()
         };
         Some(PoseUncertainty {
-            systematic: systematic.fixed_view::<3, 3>(0, 0) + by_probes([FORM_MM; 3]),
-            noise: by_probes(self.white_mm),
+            systematic: systematic.fixed_view::<3, 3>(0, 0) + by_probes([FORM_M; 3]),
+            noise: by_probes(self.white_m),
         })
     }
 }
@@ -234,16 +233,15 @@ mod tests {
     fn the_predicted_error_of_a_pose_is_what_the_decoder_makes_of_the_parameters_error() {
         let truth = parameters();
         let (planar, vertical) = ([210e-6, -330e-6, 150e-6], [120e-6, 300e-6, -260e-6]);
-        let signal_m =
-            probes(&truth).map(|probe| probe.signal_mm(planar.map(|x| x * 1e3), vertical) * 1e-3);
+        let signal_m = probes(&truth).map(|probe| probe.signal_m(planar, vertical));
         let decode = |parameters: &FieldParameters| {
             let constants = parameters.constants(1.0).expect("sound");
             let vertical = VerticalPose::from_array(vertical);
             constants.decode(signal_m, &vertical).to_array()
         };
         let noise = Noise {
-            white_mm: [5e-4; 3],
-            drift_mm: [0.0; 3],
+            white_m: [5e-7; 3],
+            drift: [0.0; 3],
         };
         for k in 0..COUNT {
             let values = truth.probes.as_flattened();
@@ -262,7 +260,7 @@ mod tests {
             };
             // Errors of the form act as the noise of the probes does.
             let form_only = at_pose(DMatrix::zeros(UNKNOWNS, UNKNOWNS));
-            let form_noise = form_only.noise * (FORM_MM / noise.white_mm[0]).powi(2);
+            let form_noise = form_only.noise * (FORM_M / noise.white_m[0]).powi(2);
             assert!((form_only.systematic - form_noise).norm() < 1e-9 * form_noise.norm());
             let parameters_only = at_pose(covariance).systematic - form_only.systematic;
             for axis in 0..3 {

@@ -1,7 +1,7 @@
-//! What a probe reads by the field model, with its derivatives, in mm and mrad.
+//! What a probe reads by the field model, with its derivatives, in SI.
 
 use super::parameters::{FieldParameters, place};
-use super::terms::{CARRY, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, THETA};
+use super::terms::{CARRY, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPE_UNIT_M, SHAPES, SLOPES, THETA};
 
 /// One probe, ready to be evaluated at many poses.
 #[derive(Clone, Copy, Debug)]
@@ -19,13 +19,13 @@ pub struct Probe {
 /// What a probe reads at a pose, and how that changes.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    /// Displacement at the designed scale, mm.
-    pub signal_mm: f64,
-    /// Its derivatives by X, Y (mm) and Rz (mrad).
+    /// Displacement at the designed scale, m.
+    pub signal_m: f64,
+    /// Its derivatives by X, Y (m) and Rz (rad).
     pub by_pose: [f64; 3],
-    /// Its derivatives by Z, Rx, Ry, mm per m and rad.
+    /// Its derivatives by Z (m), Rx and Ry (rad).
     pub by_vertical: [f64; 3],
-    /// Its derivatives by the parameters of the probe, in mm and their units.
+    /// Its derivatives by the parameters of the probe, in m and their units.
     pub by_parameter: [f64; PER_PROBE],
 }
 
@@ -59,20 +59,20 @@ impl Probe {
         1.0 + (self.gain_per_k[0] * temperature_k[0] + self.gain_per_k[1] * temperature_k[1])
     }
 
-    /// The displacement read at the planar pose `planar_mm` (mm, mm, mrad) and the vertical pose
-    /// `vertical` (m, rad, rad), at the designed scale, mm.
+    /// The displacement read at the planar pose `planar` (m, m, rad) and the vertical pose
+    /// `vertical` (m, rad, rad), at the designed scale, m.
     #[inline(always)]
-    pub fn signal_mm(&self, planar_mm: [f64; 3], vertical: [f64; 3]) -> f64 {
-        self.read(planar_mm, vertical).signal_mm
+    pub fn signal_m(&self, planar: [f64; 3], vertical: [f64; 3]) -> f64 {
+        self.read(planar, vertical).signal_m
     }
 
-    /// The reading at the planar pose `planar_mm` (mm, mm, mrad) and the vertical pose
+    /// The reading at the planar pose `planar` (m, m, rad) and the vertical pose
     /// `vertical` (m, rad, rad).
     #[inline(always)]
-    pub fn read(&self, planar_mm: [f64; 3], vertical: [f64; 3]) -> Reading {
+    pub fn read(&self, planar: [f64; 3], vertical: [f64; 3]) -> Reading {
         let p = &self.values;
         let (sin, cos) = (self.sin, self.cos);
-        let [x, y, rz] = planar_mm;
+        let [x, y, rz] = planar;
         let [v0, v1, v2] = vertical;
         let along = cos * y - sin * x;
         let across = -(cos * x) - sin * y;
@@ -82,15 +82,16 @@ impl Probe {
         let change = (p[SLOPES] * v0 + p[SLOPES + 1] * v1) + p[SLOPES + 2] * v2;
         let phi = p[ETA] + change;
         let z = change * per_eta;
-        let carried = ((p[CARRY] * v0 + p[CARRY + 1] * v1) + p[CARRY + 2] * v2) * 1e3;
+        let carried = (p[CARRY] * v0 + p[CARRY + 1] * v1) + p[CARRY + 2] * v2;
 
-        let (m, [p_u, p_w, p_z]) = shape(p, u, w, z);
-        let mut shape_mm = 0.0;
+        let (m, [p_u, p_w, p_z]) = shape(p, u / SHAPE_UNIT_M, w / SHAPE_UNIT_M, z);
+        let mut own = 0.0;
         for k in 0..SHAPE {
-            shape_mm += p[SHAPES + k] * m[k];
+            own += p[SHAPES + k] * m[k];
         }
-        let at_probe = (u + carried) + shape_mm;
-        let (by_u, by_w, by_z) = (phi * (1.0 + p_u), phi * p_w, phi * p_z * per_eta);
+        let at_probe = (u + carried) + own * SHAPE_UNIT_M;
+        let phi_shape = phi * SHAPE_UNIT_M;
+        let (by_u, by_w, by_z) = (phi * (1.0 + p_u), phi * p_w, phi_shape * p_z * per_eta);
         let slope = at_probe + by_z;
         let by_arm = by_w * rz;
 
@@ -100,19 +101,19 @@ impl Probe {
         by_parameter[ETA] = at_probe - by_z * z;
         for (k, v) in vertical.into_iter().enumerate() {
             by_parameter[SLOPES + k] = slope * v + by_arm * self.lateral_arm_by_slope[k];
-            by_parameter[CARRY + k] = phi * v * 1e3;
+            by_parameter[CARRY + k] = phi * v;
         }
         for k in 0..SHAPE {
-            by_parameter[SHAPES + k] = phi * m[k];
+            by_parameter[SHAPES + k] = phi_shape * m[k];
         }
         Reading {
-            signal_mm: phi * at_probe,
+            signal_m: phi * at_probe,
             by_pose: [
                 -(by_u * sin) - by_w * cos,
                 by_u * cos - by_w * sin,
                 by_u * p[LEVER_ARM] + by_w * self.lateral_arm,
             ],
-            by_vertical: [0, 1, 2].map(|k| slope * p[SLOPES + k] + 1e3 * phi * p[CARRY + k]),
+            by_vertical: [0, 1, 2].map(|k| slope * p[SLOPES + k] + phi * p[CARRY + k]),
             by_parameter,
         }
     }
@@ -182,7 +183,7 @@ mod tests {
     use crate::estimator::sample_for_tests::parameters;
     use crate::estimator::terms::TERMS;
 
-    const PLANAR_MM: [f64; 3] = [0.31, -0.42, 0.23];
+    const PLANAR: [f64; 3] = [0.31e-3, -0.42e-3, 0.23e-3];
     const VERTICAL: [f64; 3] = [180e-6, -390e-6, 270e-6];
 
     #[test]
@@ -190,16 +191,16 @@ mod tests {
         let mut flat = parameters();
         flat.probes[1][SLOPES] = 2.0;
         for parameters in [parameters(), flat] {
-            let read = probes(&parameters).map(|probe| probe.read(PLANAR_MM, VERTICAL));
+            let read = probes(&parameters).map(|probe| probe.read(PLANAR, VERTICAL));
             for (k, read) in read.iter().enumerate() {
                 for axis in 0..3 {
                     let moved = |planar: f64, vertical: f64| {
-                        let (mut planar_mm, mut at) = (PLANAR_MM, VERTICAL);
-                        planar_mm[axis] += planar;
+                        let (mut at_planar, mut at) = (PLANAR, VERTICAL);
+                        at_planar[axis] += planar;
                         at[axis] += vertical;
-                        probes(&parameters)[k].signal_mm(planar_mm, at)
+                        probes(&parameters)[k].signal_m(at_planar, at)
                     };
-                    let slope = (moved(1e-5, 0.0) - moved(-1e-5, 0.0)) / 2e-5;
+                    let slope = (moved(1e-8, 0.0) - moved(-1e-8, 0.0)) / 2e-8;
                     assert!((slope - read.by_pose[axis]).abs() < 1e-9, "{k} {axis}");
                     let slope = (moved(0.0, 1e-6) - moved(0.0, -1e-6)) / 2e-6;
                     let found = read.by_vertical[axis];
@@ -211,10 +212,10 @@ mod tests {
                     let moved = |step: f64| {
                         let mut parameters = parameters;
                         parameters.probes[k][term] += step;
-                        probes(&parameters)[k].signal_mm(PLANAR_MM, VERTICAL)
+                        probes(&parameters)[k].signal_m(PLANAR, VERTICAL)
                     };
                     let slope = (moved(step) - moved(-step)) / (2.0 * step);
-                    let close = (slope - found).abs() < 1e-7 * found.abs() + 1e-10;
+                    let close = (slope - found).abs() < 1e-7 * found.abs() + 1e-13;
                     assert!(close, "{k} {}: {slope} {found}", TERMS[term].name);
                 }
             }

@@ -25,6 +25,9 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use std::sync::Arc;
 
+/// A fitness counts errors of a pose in this unit, m and rad: um and urad, as in the paper.
+pub const UNIT: f64 = 1e-6;
+
 /// What a solver minimises: the sum of squared pose errors over some rows of a log.
 #[derive(Clone, Debug)]
 pub struct Problem<'a> {

@@ -127,7 +127,7 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
     let mut problem = problem.thinned(ROWS);
     let mut solution = solve(&problem, None)?;
     for _ in 0..ROUNDS {
-        let residuals = residuals_um(&problem, &solution.parameters);
+        let residuals = residuals(&problem, &solution.parameters);
         let movements = problem.rows.movement_rows();
         let weights = least_magnitudes(residuals.ok_or(SolveError::NoUsableStart)?, movements);
         let rows = &mut Arc::make_mut(&mut problem.rows).rows;
@@ -139,9 +139,9 @@ pub fn start(problem: &Problem<'_>) -> Result<Solution, SolveError> {
     Ok(solution)
 }
 
-/// The reference less the decoded pose of every row, with no offset taken off, um, um, urad;
+/// The reference less the decoded pose of every row, with no offset taken off, m, m, rad;
 /// `None` next to a pole.
-fn residuals_um(problem: &Problem<'_>, parameters: &Parameters) -> Option<Vec<[f64; 3]>> {
+fn residuals(problem: &Problem<'_>, parameters: &Parameters) -> Option<Vec<[f64; 3]>> {
     let decoder = Decoder::new(parameters, problem.stage)?;
     problem
         .rows

@@ -1,4 +1,4 @@
-//! Rows of a log in mm and mrad, by movement and in short blocks.
+//! Rows of a log with their rates, by movement and in short blocks.
 //!
 //! Neighbouring rows see nearly the same pose: the mean of a few rows' residuals and derivatives
 //! holds their information on the parameters, and is a tenth of the work for all that follows. The
@@ -31,19 +31,17 @@ const IDLE_SHARE: f64 = 0.01;
 pub struct FieldRow {
     /// Time within the log, s.
     pub time_s: f64,
-    /// Displacement read by A, B, C at the designed scale, mm.
-    pub signal_mm: [f64; 3],
-    /// Z, Rx, Ry: m, rad, rad.
+    /// See [`Row::signal_m`].
+    pub signal_m: [f64; 3],
+    /// See [`Row::vertical`].
     pub vertical: [f64; 3],
-    /// Reference X, Y, Rz: mm, mm, mrad.
-    pub reference_mm: [f64; 3],
-    /// Its change by time: mm/s, mm/s, mrad/s.
-    pub rate_mm_per_s: [f64; 3],
-    /// Change of Z, Rx, Ry by time: m/s, rad/s, rad/s.
-    pub vertical_rate: [f64; 3],
+    /// See [`Row::reference`].
+    pub reference: [f64; 3],
+    /// Change of X, Y, Rz by the reference and of Z, Rx, Ry by time: m/s, rad/s.
+    pub rate: [f64; 6],
     /// Acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, m/s2; 0 where rows are missing.
     pub acceleration_m_s2: [f64; 6],
-    /// dM and dH over the gain of A, B, C that [`Self::signal_mm`] is compensated for, K.
+    /// dM and dH over the gain of A, B, C that [`Self::signal_m`] is compensated for, K.
     pub temperature_k: [[f64; 2]; 3],
     /// How much it counts: 1 unless a robust loss says less.
     pub weight: f64,
@@ -62,8 +60,8 @@ pub struct Rows {
     pub numbers: Vec<usize>,
     /// Movements of the whole log, with or without rows here.
     pub movements_of_log: usize,
-    /// Largest magnitudes of X, Y, Rz (mm, mm, mrad), each movement's middle taken off.
-    pub planar_range_mm: [f64; 3],
+    /// Largest magnitudes of X, Y, Rz (m, m, rad), each movement's middle taken off.
+    pub planar_range: [f64; 3],
     /// Largest magnitudes of Z, Rx, Ry: m, rad, rad.
     pub vertical_range: [f64; 3],
 }
@@ -103,11 +101,11 @@ impl Rows {
 
     /// Rows in time order, and where each movement stands among them.
     pub fn from_movements(rows: Vec<FieldRow>, movements: Vec<Range<usize>>) -> Self {
-        let (planar_range_mm, vertical_range) = ranges(&rows, &movements);
+        let (planar_range, vertical_range) = ranges(&rows, &movements);
         let most: [f64; 6] = std::array::from_fn(|axis| {
             2.0 * MOTION_MAX
                 * if axis < 3 {
-                    planar_range_mm[axis]
+                    planar_range[axis]
                 } else {
                     vertical_range[axis - 3]
                 }
@@ -121,7 +119,7 @@ impl Rows {
                 let (a, b) = (&rows[start], &rows[k]);
                 let moved = |axis: usize| {
                     let (from, to) = if axis < 3 {
-                        (a.reference_mm[axis], b.reference_mm[axis])
+                        (a.reference[axis], b.reference[axis])
                     } else {
                         (a.vertical[axis - 3], b.vertical[axis - 3])
                     };
@@ -141,7 +139,7 @@ impl Rows {
             numbers: (0..by_movement.len()).collect(),
             movements_of_log: by_movement.len(),
             movements: by_movement,
-            planar_range_mm,
+            planar_range,
             vertical_range,
         }
     }
@@ -183,7 +181,7 @@ impl Rows {
     pub fn thinned(&self, most: usize) -> Self {
         let movements: Vec<Range<usize>> = self.movement_rows().collect();
         let moved: Vec<f64> = (movements.par_iter())
-            .map(|rows| moved_mm(&self.rows[rows.clone()]))
+            .map(|rows| moved(&self.rows[rows.clone()]))
             .collect();
         let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
         let moving = moved.iter().filter(|moved| **moved > idle).count();
@@ -220,18 +218,18 @@ impl Rows {
 impl FieldRow {
     /// Where the stage was: the reference with its lag and its offset taken off.
     #[inline(always)]
-    pub fn planar_mm(&self, lag_s: f64, offset_mm: [f64; 3]) -> [f64; 3] {
-        let at = |k: usize| (self.reference_mm[k] + self.rate_mm_per_s[k] * lag_s) + offset_mm[k];
+    pub fn planar(&self, lag_s: f64, offset: [f64; 3]) -> [f64; 3] {
+        let at = |k: usize| (self.reference[k] + self.rate[k] * lag_s) + offset[k];
         [at(0), at(1), at(2)]
     }
 
-    /// X, Y, Rz (mm, mm, mrad) and Z, Rx, Ry (m, rad, rad) when a probe was read.
+    /// X, Y, Rz (m, m, rad) and Z, Rx, Ry (m, rad, rad) when a probe was read.
     #[inline(always)]
-    pub fn pose(&self, dynamics: &Dynamics, probe: usize, offset_mm: [f64; 3]) -> [[f64; 3]; 2] {
+    pub fn pose(&self, dynamics: &Dynamics, probe: usize, offset: [f64; 3]) -> [[f64; 3]; 2] {
         let late_s = dynamics.probe_lag_s[probe];
-        let vertical = |k: usize| self.vertical[k] - self.vertical_rate[k] * late_s;
+        let vertical = |k: usize| self.vertical[k] - self.rate[3 + k] * late_s;
         [
-            self.planar_mm(dynamics.lag_s - late_s, offset_mm),
+            self.planar(dynamics.lag_s - late_s, offset),
             [0, 1, 2].map(vertical),
         ]
     }
@@ -239,7 +237,6 @@ impl FieldRow {
 
 fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> FieldRow {
     let row = &dataset.rows[index];
-    let rate = speed(dataset, index, trusted);
     let [x, y, rz, z, rx, ry] = acceleration(dataset, index, trusted);
     let temperature = &dataset.temperature;
     let temperature_mc = row.frame.temperature_mc();
@@ -248,11 +245,10 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
     FieldRow {
         temperature_k: gain.map(|gain| changes_k.map(|change| change / gain)),
         time_s: row.t_us as f64 * 1e-6,
-        signal_mm: row.signal_m.map(|s| s * 1e3),
+        signal_m: row.signal_m,
         vertical: row.vertical,
-        reference_mm: row.reference.map(|q| q * 1e3),
-        rate_mm_per_s: [0, 1, 2].map(|k| rate[k] * 1e3),
-        vertical_rate: [rate[3], rate[4], rate[5]],
+        reference: row.reference,
+        rate: speed(dataset, index, trusted),
         acceleration_m_s2: [x, y, ARM_M * rz, z, ARM_M * rx, ARM_M * ry],
         weight,
     }
@@ -316,10 +312,10 @@ pub fn planar_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<[[f64; 3]; 2]> 
     (0..dataset.rows.len()).into_par_iter().map(at).collect()
 }
 
-/// How far a movement moves: the largest range of X, Y (mm) and Rz (mrad) by the reference.
-fn moved_mm(rows: &[FieldRow]) -> f64 {
+/// How far a movement moves: the largest range of X, Y (m) and Rz (rad) by the reference.
+fn moved(rows: &[FieldRow]) -> f64 {
     let span = |axis: usize| {
-        let references = rows.iter().map(|row| row.reference_mm[axis]);
+        let references = rows.iter().map(|row| row.reference[axis]);
         stage::Range::around(references).width()
     };
     (0..3).map(span).fold(0.0, f64::max)
@@ -333,11 +329,10 @@ fn mean_row(rows: &[FieldRow]) -> FieldRow {
     let three = |of: &dyn Fn(&FieldRow) -> [f64; 3]| [0, 1, 2].map(|k| mean(&|row| of(row)[k]));
     FieldRow {
         time_s: mean(&|row| row.time_s),
-        signal_mm: three(&|row| row.signal_mm),
+        signal_m: three(&|row| row.signal_m),
         vertical: three(&|row| row.vertical),
-        reference_mm: three(&|row| row.reference_mm),
-        rate_mm_per_s: three(&|row| row.rate_mm_per_s),
-        vertical_rate: three(&|row| row.vertical_rate),
+        reference: three(&|row| row.reference),
+        rate: std::array::from_fn(|axis| mean(&|row| row.rate[axis])),
         acceleration_m_s2: std::array::from_fn(|axis| mean(&|row| row.acceleration_m_s2[axis])),
         temperature_k: [0, 1, 2]
             .map(|k| [0, 1].map(|sensor| mean(&|row| row.temperature_k[k][sensor]))),
@@ -352,8 +347,8 @@ fn ranges(rows: &[FieldRow], movements: &[Range<usize>]) -> ([f64; 3], [f64; 3])
         for axis in 0..3 {
             let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
             for row in &rows[movement.clone()] {
-                low = low.min(row.reference_mm[axis]);
-                high = high.max(row.reference_mm[axis]);
+                low = low.min(row.reference[axis]);
+                high = high.max(row.reference[axis]);
                 vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
             }
             planar[axis] = planar[axis].max(0.5 * (high - low));

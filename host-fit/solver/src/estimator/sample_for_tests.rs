@@ -96,7 +96,7 @@ impl Run {
                 }
                 let seen = at(row.saturating_sub(self.lag_rows)).0;
                 let signal_m = [0, 1, 2].map(|k| {
-                    let read = probes[k].signal_mm(planar.map(|x| x * 1e3), vertical) * 1e-3;
+                    let read = probes[k].signal_m(planar, vertical);
                     read + self.white_m * normal(&mut random)
                 });
                 for (error, drift) in error.iter_mut().zip(self.drift) {

@@ -1,7 +1,7 @@
 //! Errors in service by a posterior, and whether the field model or Model (31) has the smaller ones.
 
 use super::parameters::FieldParameters;
-use super::posterior::{FORM_MM, PoseErrors, Posterior};
+use super::posterior::{FORM_M, PoseErrors, Posterior};
 use super::probe::probes;
 use super::terms::COUNT;
 use crate::estimator::paper::Parameters;
@@ -48,7 +48,7 @@ impl Service {
     /// do not determine a pose.
     pub fn new(
         parameters: &FieldParameters,
-        white_mm: [f64; 3],
+        white_m: [f64; 3],
         poses: impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])>,
     ) -> Option<Self> {
         let probes = probes(parameters);
@@ -71,18 +71,18 @@ impl Service {
             }
             service.poses.push(errors);
         }
-        service.by_noise = service.by_signals(white_mm.map(|mm| mm * mm));
-        service.by_form = service.by_signals([FORM_MM * FORM_MM; 3]);
+        service.by_noise = service.by_signals(white_m.map(|m| m * m));
+        service.by_form = service.by_signals([FORM_M * FORM_M; 3]);
         Some(service)
     }
 
-    /// Variances of X, Y, Rz (m2, m2, rad2) by errors of the signals of A, B, C with these variances, mm2.
-    pub fn by_signals(&self, variances_mm2: [f64; 3]) -> [f64; 3] {
+    /// Variances of X, Y, Rz (m2, m2, rad2) by errors of the signals of A, B, C with these variances, m2.
+    pub fn by_signals(&self, variances_m2: [f64; 3]) -> [f64; 3] {
         let share = 1.0 / self.poses.len() as f64;
         [0, 1, 2].map(|axis| {
             let of_pose = |pose: &PoseErrors| {
-                let terms = pose.by_signal[axis].iter().zip(variances_mm2);
-                terms.map(|(by, mm2)| by * by * mm2).sum::<f64>()
+                let terms = pose.by_signal[axis].iter().zip(variances_m2);
+                terms.map(|(by, m2)| by * by * m2).sum::<f64>()
             };
             share * self.poses.iter().map(of_pose).sum::<f64>()
         })
@@ -141,8 +141,7 @@ fn difference(
     let probes = probes(parameters);
     let mut sum = [0.0; 3];
     for (planar, vertical) in service_poses(ranges) {
-        let planar_mm = planar.map(|x| x * 1e3);
-        let signal_m = [0, 1, 2].map(|k| probes[k].signal_mm(planar_mm, vertical) * 1e-3);
+        let signal_m = probes.map(|probe| probe.signal_m(planar, vertical));
         let decoded = constants.decode(signal_m, &VerticalPose::from_array(vertical));
         for ((sum, decoded), planar) in sum.iter_mut().zip(decoded.to_array()).zip(planar) {
             *sum += (decoded - planar) * (decoded - planar) / POSES as f64;
@@ -172,7 +171,7 @@ impl ServiceVariance {
         other: &FieldParameters,
         ranges: ([f64; 3], [f64; 3]),
     ) -> Self {
-        let found = Service::new(parameters, posterior.white_mm, service_poses(ranges)).and_then(
+        let found = Service::new(parameters, posterior.white_m, service_poses(ranges)).and_then(
             |service| {
                 Some(Self {
                     difference: difference(parameters, other, ranges)?,

@@ -11,6 +11,8 @@ pub const COUNT: usize = 3 * PER_PROBE;
 pub const BEYOND_MODEL_31: usize = CARRY;
 /// The monomials of p.
 pub const SHAPE: usize = 18;
+/// The coefficients of p take u, w and p in this unit, m: their sizes are then about one.
+pub(super) const SHAPE_UNIT_M: f64 = 1e-3;
 
 /// Place of the lever arm among the parameters of a probe.
 pub(super) const LEVER_ARM: usize = 0;

@@ -66,15 +66,15 @@ fn the_noise_of_the_probes_and_the_walk_of_the_reference_are_separated() {
         drift: [0.3e-6, 0.1e-6, 0.5e-6],
         ..Run::EIGHT_SECONDS
     });
-    for white in fit.figures.noise.white_mm {
-        assert!((white / 0.5e-3 - 1.0).abs() < 0.05, "{white}");
+    for white in fit.figures.noise.white_m {
+        assert!((white / 0.5e-6 - 1.0).abs() < 0.05, "{white}");
     }
     for (drift, truth) in fit
         .figures
         .noise
-        .drift_mm
+        .drift
         .into_iter()
-        .zip([0.3e-3, 0.1e-3, 0.5e-3])
+        .zip([0.3e-6, 0.1e-6, 0.5e-6])
     {
         assert!((drift / truth - 1.0).abs() < 0.5, "{drift} {truth}");
     }

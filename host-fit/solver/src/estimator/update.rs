@@ -8,7 +8,7 @@
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION, lag_prior};
 use super::error::FieldFitError;
-use super::noise::white_mm;
+use super::noise::white_m;
 use super::parameters::FieldParameters;
 use super::posterior::Posterior;
 use super::probe::probes;
@@ -143,8 +143,8 @@ impl Update {
 }
 
 /// Fits the change to all rows of a dataset. The signals are compensated by k and h of the old calibration.
-/// `covariance` is the old [`Posterior::covariance`]; without it the other parameters are fixed. `drift_mm` is the
-/// walk of the reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds do not determine it.
+/// `covariance` is the old [`Posterior::covariance`]; without it the other parameters are fixed. `drift` is the
+/// walk of the reference in X, Y, Rz in a second, m, m, rad: a few seconds do not determine it.
 ///
 /// # Errors
 /// [`FieldFitError::Singular`] where a number is not finite or
@@ -155,26 +155,20 @@ pub fn update(
     old: &FieldParameters,
     covariance: Option<&DMatrix<f64>>,
     change: Change,
-    drift_mm: [f64; 3],
+    drift: [f64; 3],
 ) -> Result<Update, FieldFitError> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let rows = Rows::new(dataset, &all);
     let basis = factor(old, covariance, change).ok_or(FieldFitError::Singular)?;
-    let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
+    let offsets = vec![[0.0; 3]; rows.movements.len()];
     let equations = FieldEquations {
         rows: &rows,
         places: old.places,
         noise: Noise {
-            white_mm: white_mm(
-                &rows,
-                &probes(old),
-                &Dynamics::default(),
-                &offsets_mm,
-                stage,
-            ),
-            drift_mm,
+            white_m: white_m(&rows, &probes(old), &Dynamics::default(), &offsets, stage),
+            drift,
         },
-        resets_mm: stage.resets_mm(),
+        resets: stage.reset_sd,
         faults: &[],
     };
     let mut origin = DVector::zeros(UNKNOWNS);
@@ -190,7 +184,7 @@ pub fn update(
     // As in a fit: what acceleration adds is an unknown where the log determines it.
     let at = Point {
         values: unknowns.origin.clone(),
-        offsets: offsets_mm.clone(),
+        offsets: offsets.clone(),
     };
     let expected =
         (equations.normal(&at)).and_then(|normal: Normal<COLUMNS>| unknowns.covariance(&normal));
@@ -201,7 +195,7 @@ pub fn update(
             .fill(0.0);
     }
     let solved: Option<Solved<COLUMNS>> =
-        gauss_newton::solve(&equations, &unknowns, x, offsets_mm, Limits::CLOSE);
+        gauss_newton::solve(&equations, &unknowns, x, offsets, Limits::CLOSE);
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {

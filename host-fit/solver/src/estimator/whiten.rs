@@ -27,16 +27,16 @@ pub const UNKNOWNS: usize = ACCELERATIONS + 18;
 pub const LAG_RATE: usize = UNKNOWNS;
 /// Columns: these and the residual, a multiple of four.
 pub const COLUMNS: usize = (LAG_RATE + 2).next_multiple_of(4);
-/// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
-const OFFSET_MM: f64 = 1.0;
+/// Standard deviation of an offset before a movement is seen, m: far beyond any reset's.
+const OFFSET_M: f64 = 1e-3;
 
 /// Noise of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// White noise of the probes A, B, C from row to row, standard deviation, mm.
-    pub white_mm: [f64; 3],
-    /// Random walk of the reference in X, Y, Rz: standard deviation after a second, mm, mm, mrad.
-    pub drift_mm: [f64; 3],
+    /// White noise of the probes A, B, C from row to row, standard deviation, m.
+    pub white_m: [f64; 3],
+    /// Random walk of the reference in X, Y, Rz: standard deviation after a second, m, m, rad.
+    pub drift: [f64; 3],
 }
 
 /// The field model with the rows of a log.
@@ -48,9 +48,9 @@ pub struct FieldEquations<'a> {
     pub places: [[f64; 2]; 3],
     /// Their noise.
     pub noise: Noise,
-    /// Errors of the resets in X, Y, Rz, standard deviations, mm, mm, mrad; `None` where nothing is known.
-    pub resets_mm: Option<[f64; 3]>,
-    /// What a unit of each fault adds to the signals A, B, C, by block, mm; how large it is stands behind the
+    /// Errors of the resets in X, Y, Rz, standard deviations, m, m, rad; `None` where nothing is known.
+    pub resets: Option<[f64; 3]>,
+    /// What a unit of each fault adds to the signals A, B, C, by block, m; how large it is stands behind the
     /// [`UNKNOWNS`].
     pub faults: &'a [Vec<[f64; 3]>],
 }
@@ -67,11 +67,11 @@ impl FieldEquations<'_> {
     }
 
     /// Standard deviation of the offset of a movement before it is seen, and its mean beyond the offset that is taken off
-    /// already, mm, mm, mrad.
-    fn start(&self, offset_mm: [f64; 3]) -> [[f64; 3]; 2] {
-        match self.resets_mm {
-            Some(resets_mm) => [resets_mm, offset_mm.map(|x| -x)],
-            None => [[OFFSET_MM; 3], [0.0; 3]],
+    /// already, m, m, rad.
+    fn start(&self, offset: [f64; 3]) -> [[f64; 3]; 2] {
+        match self.resets {
+            Some(resets) => [resets, offset.map(|x| -x)],
+            None => [[OFFSET_M; 3], [0.0; 3]],
         }
     }
 
@@ -90,11 +90,9 @@ impl FieldEquations<'_> {
         let probes = probes(&self.parameters(at));
         let dynamics = Dynamics::from_values(at.values.as_slice());
         let (mut rows, mut gains) = (Vec::new(), Vec::new());
-        for (k, offset_mm) in at.offsets.iter().enumerate() {
-            let blocks = self
-                .rows
-                .evaluate_movement(k, &probes, &dynamics, *offset_mm);
-            self.filter(k, &blocks, *offset_mm, self.sizes(at), |gain, row| {
+        for (k, offset) in at.offsets.iter().enumerate() {
+            let blocks = self.rows.evaluate_movement(k, &probes, &dynamics, *offset);
+            self.filter(k, &blocks, *offset, self.sizes(at), |gain, row| {
                 rows.push(row);
                 gains.push(gain);
             });
@@ -111,11 +109,11 @@ impl FieldEquations<'_> {
         &self,
         movement: usize,
         blocks: &[Block],
-        offset_mm: [f64; 3],
+        offset: [f64; 3],
         sizes: &[f64],
     ) -> Normal<W> {
         let mut out = Normal::none();
-        let end = self.filter(movement, blocks, offset_mm, sizes, |_, row| {
+        let end = self.filter(movement, blocks, offset, sizes, |_, row| {
             out.add_row(&row, 1.0);
         });
         out.ends.push(end);
@@ -127,20 +125,20 @@ impl FieldEquations<'_> {
         &self,
         movement: usize,
         blocks: &[Block],
-        offset_mm: [f64; 3],
+        offset: [f64; 3],
         sizes: &[f64],
         mut take: impl FnMut(Gain, [[f64; W]; 3]),
     ) -> [[f64; W]; 3] {
-        let [resets_mm, expected_mm] = self.start(offset_mm);
+        let [resets, expected] = self.start(offset);
         let mut end = [[0.0; W]; 3];
         let mut spread: Matrix = [[0.0; 3]; 3];
         for (axis, row) in spread.iter_mut().enumerate() {
-            row[axis] = resets_mm[axis] * resets_mm[axis];
-            end[axis][W - 1] = expected_mm[axis];
+            row[axis] = resets[axis] * resets[axis];
+            end[axis][W - 1] = expected[axis];
         }
         let mut time_s = blocks.first().map_or(0.0, |block| block.time_s);
         for (number, block) in (self.rows.movements[movement].start..).zip(blocks) {
-            for (axis, drift) in self.noise.drift_mm.into_iter().enumerate() {
+            for (axis, drift) in self.noise.drift.into_iter().enumerate() {
                 spread[axis][axis] += drift * drift * (block.time_s - time_s).max(0.0);
             }
             time_s = block.time_s;
@@ -172,9 +170,9 @@ impl<const W: usize> Equations<W> for FieldEquations<'_> {
         let probes = probes(&self.parameters(at));
         let dynamics = Dynamics::from_values(at.values.as_slice());
         Normal::sum(self.rows.movements.len(), |k| {
-            let offset_mm = at.offsets[k];
-            let blocks = (self.rows).evaluate_movement(k, &probes, &dynamics, offset_mm);
-            Some(self.sums(k, &blocks, offset_mm, self.sizes(at)))
+            let offset = at.offsets[k];
+            let blocks = (self.rows).evaluate_movement(k, &probes, &dynamics, offset);
+            Some(self.sums(k, &blocks, offset, self.sizes(at)))
         })
     }
 }
@@ -200,7 +198,7 @@ pub(super) fn columns<const W: usize>(block: &Block) -> [[f64; W]; 3] {
         let own = ACCELERATIONS + 6 * probe;
         column[own..own + 6].copy_from_slice(&block.acceleration_m_s2);
         column[LAG_RATE] = block.by_lag[probe] * block.time_s;
-        column[W - 1] = block.residual_mm[probe];
+        column[W - 1] = block.residual_m[probe];
     }
     columns
 }
@@ -240,7 +238,7 @@ impl Gain {
         let mut innovation =
             each(|i, k| h[i][0] * seen[0][k] + h[i][1] * seen[1][k] + h[i][2] * seen[2][k]);
         for (k, row) in innovation.iter_mut().enumerate() {
-            row[k] += noise.white_mm[k] * noise.white_mm[k] / block.rows;
+            row[k] += noise.white_m[k] * noise.white_m[k] / block.rows;
         }
         let factor = cholesky(&innovation);
         let kalman = seen.map(|row| solve(&factor, row));

@@ -31,7 +31,7 @@ fn the_columns_of_motion_are_the_derivatives_of_the_model() {
         for (k, block) in at(unknown, 0.0).iter().enumerate() {
             let found: [[f64; COLUMNS]; 3] = columns(block);
             for (probe, row) in found.iter().enumerate() {
-                let change = before[k].residual_mm[probe] - after[k].residual_mm[probe];
+                let change = before[k].residual_m[probe] - after[k].residual_m[probe];
                 let error = (row[unknown] - change / (2.0 * step)).abs();
                 assert!(error < 1e-6, "{unknown}, {probe}: {error}");
                 largest = largest.max(row[unknown].abs());
@@ -55,16 +55,16 @@ fn the_filter_whitens_as_the_whole_covariance_does() {
     let rows = Rows::new(&dataset, &all);
     let blocks = rows.evaluate(&probes(&parameters()), &Dynamics::default(), &[[0.0; 3]; 2]);
     let noise = Noise {
-        white_mm: [5e-4, 4e-4, 6e-4],
-        drift_mm: [1e-3, 2e-3, 5e-4],
+        white_m: [5e-7, 4e-7, 6e-7],
+        drift: [1e-6, 2e-6, 5e-7],
     };
-    for resets_mm in [None, Some([2e-3, 3e-3, 1e-3])] {
-        let reset_mm = resets_mm.unwrap_or([OFFSET_MM; 3]);
+    for resets in [None, Some([2e-6, 3e-6, 1e-6])] {
+        let reset = resets.unwrap_or([OFFSET_M; 3]);
         let equations = FieldEquations {
             rows: &rows,
             places: parameters().places,
             noise,
-            resets_mm,
+            resets,
             faults: &[],
         };
         let found = equations.sum_blocks(&blocks);
@@ -78,11 +78,11 @@ fn the_filter_whitens_as_the_whole_covariance_does() {
                 let time_s = a.time_s.min(b.time_s) - blocks[0].time_s;
                 let shared: f64 = (0..3)
                     .map(|axis| {
-                        let walk = noise.drift_mm[axis].powi(2) * time_s + reset_mm[axis].powi(2);
+                        let walk = noise.drift[axis].powi(2) * time_s + reset[axis].powi(2);
                         a.by_pose[i % 3][axis] * walk * b.by_pose[j % 3][axis]
                     })
                     .sum();
-                let white = noise.white_mm[i % 3].powi(2) / a.rows;
+                let white = noise.white_m[i % 3].powi(2) / a.rows;
                 shared + if i == j { white } else { 0.0 }
             });
             let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {

@@ -117,16 +117,16 @@ impl Suspect {
 
 /// What channels show in some rows, and how their errors change the signals.
 pub(super) struct Sensed {
-    /// What each of the nine channels shows, mm, by row.
+    /// What each of the nine channels shows, m, by row.
     pub(super) values: Vec<[f64; 9]>,
-    /// Changes of the signals (mm) for a change of each of the nine channels by 1 mm, by row.
+    /// Changes of the signals for a change of each of the nine channels, by row.
     pub(super) by_channel: Vec<[Vector3<f64>; 9]>,
 }
 
 impl Sensed {
     pub(super) fn new(rows: &[FieldRow], stage: &Stage, probes: &[Probe; 3], lag_s: f64) -> Self {
         let slopes = Slopes::new(stage, *probes);
-        let at = |row: &FieldRow| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical);
+        let at = |row: &FieldRow| slopes.at(row.planar(lag_s, [0.0; 3]), row.vertical);
         Self {
             values: Self::values(rows, stage, probes, lag_s),
             by_channel: rows.iter().map(at).collect(),
@@ -141,13 +141,11 @@ impl Sensed {
         lag_s: f64,
     ) -> Vec<[f64; 9]> {
         let values = |row: &FieldRow| {
-            let planar_mm = row.planar_mm(lag_s, [0.0; 3]);
-            let [a, b, c] = probes.map(|probe| probe.signal_mm(planar_mm, row.vertical));
-            let reference = row.reference_mm.map(|q| 1e-3 * q);
-            let beams_m = stage.interferometer.beams_m(reference, row.vertical);
-            let [x, y1, y2] = beams_m.map(|m| 1e3 * m);
+            let planar = row.planar(lag_s, [0.0; 3]);
+            let [a, b, c] = probes.map(|probe| probe.signal_m(planar, row.vertical));
+            let [x, y1, y2] = stage.interferometer.beams_m(row.reference, row.vertical);
             let vertical = VerticalPose::from_array(row.vertical);
-            let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
+            let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical);
             [a, b, c, x, y1, y2, one, two, three]
         };
         rows.iter().map(values).collect()
@@ -172,7 +170,7 @@ impl<'a> Effects<'a> {
         Self { means, sensed }
     }
 
-    /// The signals of a fault that is the same in the whole log, mm: of a gain of 1 %, of a zero of 1 um, of a time of
+    /// The signals of a fault that is the same in the whole log, m: of a gain of 1 %, of a zero of 1 um, of a time of
     /// 1 ms.
     pub(super) fn constant(&self, suspect: Suspect) -> Vec<[f64; 3]> {
         let time_s = |at: usize| self.means.rows.rows[at].time_s;
@@ -180,7 +178,7 @@ impl<'a> Effects<'a> {
             let before = at.saturating_sub(1).max(movement.start);
             let after = (at + 1).min(movement.end - 1);
             let size = |channel: usize| match suspect.quantity {
-                Quantity::Zero => 1e-3,
+                Quantity::Zero => 1e-6,
                 Quantity::Gain => 1e-2 * self.sensed.values[at][channel],
                 Quantity::Time if before == after => 0.0,
                 Quantity::Time => {

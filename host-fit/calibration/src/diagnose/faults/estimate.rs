@@ -6,7 +6,7 @@ use super::means::Means;
 use crate::diagnose::limits::ROUNDS;
 use hallstage_solver::estimator::dynamics::Dynamics;
 use hallstage_solver::estimator::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
-use hallstage_solver::estimator::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
+use hallstage_solver::estimator::noise::{DRIFT_SPREAD, USUAL_DRIFT, drift};
 use hallstage_solver::estimator::parameters::{FieldParameters, HELD, unknowns};
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
@@ -66,8 +66,8 @@ impl Estimate {
             offsets: vec![[0.0; 3]; means.rows.movements.len()],
         };
         let noise = Noise {
-            white_mm: means.white_mm,
-            drift_mm: USUAL_DRIFT_MM,
+            white_m: means.white_m,
+            drift: USUAL_DRIFT,
         };
         Self::descend(means, start.places, at, noise, faults)
     }
@@ -77,10 +77,10 @@ impl Estimate {
         let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
         let blocks = (means.rows).evaluate(&probes(parameters), &self.dynamics(), &at.offsets);
         let covariance = self.curvature.inverse();
-        noise.drift_mm = drift_mm(&means.rows, &blocks, noise.white_mm, &covariance);
-        for (drift_mm, usual_mm) in noise.drift_mm.iter_mut().zip(USUAL_DRIFT_MM) {
+        noise.drift = drift(&means.rows, &blocks, noise.white_m, &covariance);
+        for (drift, usual) in noise.drift.iter_mut().zip(USUAL_DRIFT) {
             // A free walk swallows faults.
-            *drift_mm = drift_mm.min(usual_mm * libm::exp(DRIFT_SPREAD));
+            *drift = drift.min(usual * libm::exp(DRIFT_SPREAD));
         }
         Self::descend(means, parameters.places, self.at, noise, &[])
     }
@@ -112,7 +112,7 @@ impl Estimate {
             rows: &means.rows,
             places,
             noise,
-            resets_mm: means.resets_mm,
+            resets: means.resets,
             faults,
         };
         let x = at.values.resize_vertically(size, 0.0);
@@ -135,7 +135,7 @@ impl Estimate {
         })
     }
 
-    /// With effects of faults (changes of the signals, mm) as further unknowns.
+    /// With effects of faults (changes of the signals, m) as further unknowns.
     pub(super) fn with_faults(&self, means: &Means, faults: &[Vec<[f64; 3]>]) -> Option<Self> {
         let places = self.parameters.places;
         Self::descend(means, places, self.at.clone(), self.noise, faults)

@@ -4,7 +4,7 @@ use super::estimate::{Estimate, RESIDUAL, Row};
 use super::means::Means;
 use super::motion::{Follows, Moving};
 use super::score::{Step, steps};
-use super::slow::{groups, slow_mm2};
+use super::slow::{groups, slow_m2};
 use hallstage_solver::estimator::dynamics::{PER_ACCELERATION, PROBE_LAG_S};
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::{ACCELERATIONS, PROBE_LAGS, UNKNOWNS};
@@ -39,8 +39,8 @@ pub(super) struct Evidence {
     pub(super) sizes: Vec<f64>,
     /// Lags of A, B, C behind their mean beside these errors, s.
     pub(super) probe_lags_s: [f64; 3],
-    /// Variances of slow residuals of A, B, C that nothing explains, mm2.
-    pub(super) slow_mm2: [f64; 3],
+    /// Variances of slow residuals of A, B, C that nothing explains, m2.
+    pub(super) slow_m2: [f64; 3],
 }
 
 impl Evidence {
@@ -113,7 +113,7 @@ impl Evidence {
                 * misfit(&table, &products, known, &chosen),
             sizes: (UNKNOWNS..known).map(|k| products[(k, residual)]).collect(),
             probe_lags_s: [a, b, -a - b],
-            slow_mm2: slow_mm2(means, &left),
+            slow_m2: slow_m2(means, &left),
         })
     }
 }

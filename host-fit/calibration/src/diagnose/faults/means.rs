@@ -23,11 +23,11 @@ pub(super) struct Means {
     pub(super) rows: Rows,
     /// The first row of each mean in the dataset.
     pub(super) first: Vec<usize>,
-    /// White noise of A, B, C from row to row, mm.
-    pub(super) white_mm: [f64; 3],
-    /// Errors of the resets, mm, mm, mrad, where they are declared.
-    pub(super) resets_mm: Option<[f64; 3]>,
-    /// Prior standard deviation of what acceleration adds to the readings, mm per m/s2.
+    /// White noise of A, B, C from row to row, m.
+    pub(super) white_m: [f64; 3],
+    /// Errors of the resets, m, m, rad, where they are declared.
+    pub(super) resets: Option<[f64; 3]>,
+    /// Prior standard deviation of what acceleration adds to the readings, m per m/s2.
     pub(super) acceleration: f64,
 }
 
@@ -42,12 +42,12 @@ impl Means {
         let probes = &probes(parameters);
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
         let mut rows = Rows::new(dataset, &all);
-        let residuals = rows.residuals_mm(
+        let residuals = rows.residuals_m(
             probes,
             &Dynamics::default(),
             &vec![[0.0; 3]; rows.movements.len()],
         );
-        let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
+        let least_m = stage.hall.m_per_count / 12f64.sqrt();
         let white = |pieces: &[Range<usize>]| {
             let threes = |k: usize| {
                 let windows = pieces
@@ -55,17 +55,17 @@ impl Means {
                     .flat_map(|rows| residuals[rows.clone()].windows(3));
                 windows.map(move |w| [w[0][k], w[1][k], w[2][k]])
             };
-            [0, 1, 2].map(|k| white_noise(threes(k)).max(least_mm))
+            [0, 1, 2].map(|k| white_noise(threes(k)).max(least_m))
         };
         let movements: Vec<Range<usize>> = rows.movement_rows().collect();
-        let white_mm = white(&movements);
+        let white_m = white(&movements);
         // Rows far from the middle of their block, as beside a step, have no weight.
         for block in rows.blocks.clone() {
-            for (k, white_mm) in white_mm.into_iter().enumerate() {
+            for (k, white_m) in white_m.into_iter().enumerate() {
                 let mut values: Vec<f64> = residuals[block.clone()].iter().map(|r| r[k]).collect();
                 let middle = median(&mut values).unwrap_or(0.0);
                 for row in block.clone() {
-                    if (residuals[row][k] - middle).abs() > CLEAR * white_mm {
+                    if (residuals[row][k] - middle).abs() > CLEAR * white_m {
                         rows.rows[row].weight = 0.0;
                     }
                 }
@@ -76,8 +76,8 @@ impl Means {
             let pieces = (movement.len() / PIECE).max(1);
             let end = |k: usize| movement.start + k * movement.len() / pieces;
             for piece in (0..pieces).map(|k| end(k)..end(k + 1)) {
-                let own_mm = white(std::slice::from_ref(&piece));
-                let part = [0, 1, 2].map(|k| white_mm[k] / own_mm[k].max(white_mm[k]));
+                let own_m = white(std::slice::from_ref(&piece));
+                let part = [0, 1, 2].map(|k| white_m[k] / own_m[k].max(white_m[k]));
                 let weight = part.into_iter().fold(1.0, f64::min).powi(2);
                 (rows.rows[piece].iter_mut()).for_each(|row| row.weight *= weight);
             }
@@ -86,8 +86,8 @@ impl Means {
         Self {
             rows,
             first,
-            white_mm,
-            resets_mm: stage.resets_mm(),
+            white_m,
+            resets: stage.reset_sd,
             acceleration: if shows_acceleration {
                 PER_ACCELERATION
             } else {
@@ -98,7 +98,7 @@ impl Means {
 
     /// Degrees of freedom: numbers in the means less parameters and offsets of the movements.
     pub(super) fn freedom(&self) -> f64 {
-        let offsets = self.resets_mm.map_or(self.rows.movements.len(), |_| 0);
+        let offsets = self.resets.map_or(self.rows.movements.len(), |_| 0);
         (3.0 * (self.rows.rows.len() - offsets) as f64 - COUNT as f64).max(1.0)
     }
 

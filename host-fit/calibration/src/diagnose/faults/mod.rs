@@ -83,8 +83,8 @@ pub struct Calibrated<'a> {
     pub start: &'a FieldParameters,
     /// The model.
     pub model: ModelKind,
-    /// The noise of the probes in service, mm; `None` where the readings of the log do not show it.
-    pub floor_mm: Option<[f64; 3]>,
+    /// The noise of the probes in service, m; `None` where the readings of the log do not show it.
+    pub floor_m: Option<[f64; 3]>,
     /// Whether the model describes service and the log determines it without declared errors of the resets.
     pub is_for_service: bool,
     /// Whether the parameters are fitted to the rows that are judged.
@@ -211,10 +211,10 @@ impl Finder<'_> {
 
     fn faults(&self, faultless: &Estimate) -> Option<Faults> {
         let by = self.calibrated;
-        let white_mm = self.means.white_mm;
-        let floor_mm = by.floor_mm.unwrap_or(white_mm);
-        let floor_mm = [0, 1, 2].map(|k| floor_mm[k].min(white_mm[k]));
-        let declared = declared_service(self.stage, by.parameters, floor_mm)?;
+        let white_m = self.means.white_m;
+        let floor_m = by.floor_m.unwrap_or(white_m);
+        let floor_m = [0, 1, 2].map(|k| floor_m[k].min(white_m[k]));
+        let declared = declared_service(self.stage, by.parameters, floor_m)?;
         let own = self.own_curvature(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;

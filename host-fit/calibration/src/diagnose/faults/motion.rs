@@ -76,8 +76,8 @@ impl<'a> Moving<'a> {
     ) -> Self {
         const STEP_S: f64 = 1e-3;
         let moved = |row: &FieldRow| FieldRow {
-            reference_mm: [0, 1, 2].map(|k| row.reference_mm[k] + STEP_S * row.rate_mm_per_s[k]),
-            vertical: [0, 1, 2].map(|k| row.vertical[k] + STEP_S * row.vertical_rate[k]),
+            reference: [0, 1, 2].map(|k| row.reference[k] + STEP_S * row.rate[k]),
+            vertical: [0, 1, 2].map(|k| row.vertical[k] + STEP_S * row.rate[3 + k]),
             ..*row
         };
         let later: Vec<FieldRow> = rows.iter().map(moved).collect();
@@ -98,24 +98,23 @@ impl<'a> Moving<'a> {
         }
     }
 
-    /// The change of the signals by a unit of an error, mm.
+    /// The change of the signals by a unit of an error, m.
     pub(super) fn signals(&self, at: usize, channel: usize, follows: Follows) -> Vector3<f64> {
         let (row, value, rate) = (
             &self.rows[at],
             self.sensed.values[at][channel],
             self.rates[at][channel],
         );
-        let error_mm = match follows {
+        let error_m = match follows {
             Follows::OwnSpeed => -1e-3 * rate,
-            Follows::Speed(axis @ 0..3) => 1e-3 * row.rate_mm_per_s[axis],
-            Follows::Speed(axis) => row.vertical_rate[axis - 3],
-            Follows::Acceleration(axis) => row.acceleration_m_s2[axis],
-            Follows::Turning => 1e-3 * rate / rate.hypot(KNEE * self.rms_rate[channel]).max(1e-9),
-            Follows::Power(power) => value.powi(power),
+            Follows::Speed(axis) => 1e-3 * row.rate[axis],
+            Follows::Acceleration(axis) => 1e-3 * row.acceleration_m_s2[axis],
+            Follows::Turning => 1e-6 * rate / rate.hypot(KNEE * self.rms_rate[channel]).max(1e-12),
+            Follows::Power(power) => 1e-3 * (1e3 * value).powi(power),
             Follows::Side => value.abs(),
-            Follows::Height(axis) => row.vertical[axis],
+            Follows::Height(axis) => 1e-3 * row.vertical[axis],
         };
-        self.sensed.by_channel[at][channel] * error_mm
+        self.sensed.by_channel[at][channel] * error_m
     }
 }
 
@@ -188,11 +187,10 @@ fn service_row(stage: &Stage, at: usize, (planar, vertical): ([f64; 3], [f64; 3]
     });
     FieldRow {
         time_s: 0.0,
-        signal_mm: [0.0; 3],
+        signal_m: [0.0; 3],
         vertical,
-        reference_mm: planar.map(|x| x * 1e3),
-        rate_mm_per_s: [0, 1, 2].map(|k| speed[k] * 1e3),
-        vertical_rate: [speed[3], speed[4], speed[5]],
+        reference: planar,
+        rate: speed,
         acceleration_m_s2: acceleration,
         temperature_k: [[0.0; 2]; 3],
         weight: 1.0,

@@ -27,8 +27,8 @@ pub(super) fn groups(means: &Means, together_s: f64) -> Vec<Range<usize>> {
     groups
 }
 
-/// Variances of A, B, C by slow residuals beyond noise and drift, mm2.
-pub(super) fn slow_mm2(means: &Means, left: &[Vector3<f64>]) -> [f64; 3] {
+/// Variances of A, B, C by slow residuals beyond noise and drift, m2.
+pub(super) fn slow_m2(means: &Means, left: &[Vector3<f64>]) -> [f64; 3] {
     let rows: f64 = means.rows.rows.iter().map(|row| row.weight).sum();
     let sum = |group: Range<usize>| {
         let share = 1.0 / group.len() as f64;
@@ -43,10 +43,10 @@ pub(super) fn slow_mm2(means: &Means, left: &[Vector3<f64>]) -> [f64; 3] {
         let own = groups.len() as f64 - count;
         count += own;
         let squares: Vector3<f64> = groups.into_iter().map(sum).sum();
-        for (k, white_mm) in means.white_mm.into_iter().enumerate() {
+        for (k, white_m) in means.white_m.into_iter().enumerate() {
             let power = (squares[k] - slower[k]) / own;
             if power > limit.max(1.0 + BAND_CLEAR * (2.0 / own).sqrt()) {
-                found[k] += (power - 1.0) * white_mm * white_mm * own / rows;
+                found[k] += (power - 1.0) * white_m * white_m * own / rows;
             }
         }
         slower = squares;

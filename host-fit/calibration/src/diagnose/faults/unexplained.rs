@@ -66,7 +66,7 @@ impl Unexplained {
             sensors.extend(lags_s.map(|(probe, s)| (probe, Follows::OwnSpeed, 1e3 * s)));
         }
         let at_work = AtWork::new(stage, parameters);
-        let slow = declared.by_signals(evidence.slow_mm2);
+        let slow = declared.by_signals(evidence.slow_m2);
         let [spread, none] = [&evidence.added, &DMatrix::zeros(COUNT, COUNT)]
             .map(|covariance| declared.variance(covariance).systematic);
         let is_form =

@@ -36,7 +36,7 @@ impl Residuals {
             lag_s,
             ..Dynamics::default()
         };
-        let left_mm = rows.residuals_mm(&probes, &dynamics, &vec![[0.0; 3]; rows.movements.len()]);
+        let left = rows.residuals_m(&probes, &dynamics, &vec![[0.0; 3]; rows.movements.len()]);
         let used: Vec<usize> = (0..all.len()).filter(|&row| log.usable[row]).collect();
         let centred = |values: &[f64]| {
             let mut centred = vec![0.0; values.len()];
@@ -49,8 +49,8 @@ impl Residuals {
         };
         let values = [0, 1, 2].map(|probe| {
             let mut left_m = vec![0.0; all.len()];
-            for (&row, left_mm) in used.iter().zip(&left_mm) {
-                left_m[row] = left_mm[probe] * 1e-3;
+            for (&row, left) in used.iter().zip(&left) {
+                left_m[row] = left[probe];
             }
             centred(&left_m)
         });
@@ -77,7 +77,7 @@ impl Residuals {
     /// The effect of an error of each channel on the residuals at a row.
     pub(super) fn slopes(&self, log: &LogSignals, row: usize) -> Vec<Vector3<f64>> {
         let here = &log.rows[row];
-        let slopes = (self.slopes).at(here.reference.map(|x| x * 1e3), here.vertical);
+        let slopes = (self.slopes).at(here.reference, here.vertical);
         slopes.into_iter().take(log.channels.len()).collect()
     }
 

@@ -1,4 +1,4 @@
-//! Sums of squared pose errors over the rows of a problem, um^2, um^2, urad^2, from rows in mm and mrad.
+//! Sums of squared pose errors over the rows of a problem, um^2, um^2, urad^2.
 //!
 //! The same equations as `runtime::model`, which is the model; a test holds the two equal
 //! within rounding. eta moves from phi into the matrix: PM^-1 (s / phi - delta / eta) =
@@ -7,13 +7,10 @@
 use super::poles::SHARE_MIN;
 use crate::estimator::linear::LinearPoint;
 use crate::estimator::paper::Parameters;
-use crate::estimator::problem::Problem;
+use crate::estimator::problem::{Problem, UNIT};
 use crate::estimator::rows::FieldRow;
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::{from_rows, inverse};
-
-/// um^2 in a mm^2.
-const UM2_PER_MM2: f64 = 1e6;
 
 /// The slopes over eta of A, B, C.
 struct Ratios(Matrix3<f64>);
@@ -23,12 +20,12 @@ impl Ratios {
         Self(from_rows(ratios))
     }
 
-    /// phi / eta of the three probes at a row (equation 33), and s' there, mm.
+    /// phi / eta of the three probes at a row (equation 33), and s' there, m.
     #[inline(always)]
     fn correct(&self, row: &FieldRow) -> (Vector3<f64>, Vector3<f64>) {
         let shares = Vector3::repeat(1.0) + self.0 * Vector3::from(row.vertical);
-        let corrected_mm = Vector3::from(row.signal_mm).component_div(&shares);
-        (shares, corrected_mm)
+        let corrected_m = Vector3::from(row.signal_m).component_div(&shares);
+        (shares, corrected_m)
     }
 }
 
@@ -41,14 +38,14 @@ pub fn squares_at_delta(
     let ratios = Ratios::new(&point.ratios);
     let mut squares = Vector3::zeros();
     for (number, movement) in problem.rows.numbered_movements() {
-        let zero_mm = point.gain * (Vector3::from(delta_m(number)) * 1e3);
+        let zero = point.gain * Vector3::from(delta_m(number));
         for row in &problem.rows.rows[movement] {
-            let (_, corrected_mm) = ratios.correct(row);
-            let error = point.gain * corrected_mm - Vector3::from(row.reference_mm) - zero_mm;
+            let (_, corrected_m) = ratios.correct(row);
+            let error = point.gain * corrected_m - Vector3::from(row.reference) - zero;
             squares += error.component_mul(&error);
         }
     }
-    squares * UM2_PER_MM2
+    squares / (UNIT * UNIT)
 }
 
 /// At the best zero deviation of each movement: it takes off the movement's mean pose error,
@@ -68,26 +65,26 @@ pub fn squares_at_best_delta(
         let rows = &problem.rows.rows[movement];
         let (mut sum, mut here) = (Vector3::zeros(), Vector3::zeros());
         for row in rows {
-            let (shares, corrected_mm) = ratios.correct(row);
+            let (shares, corrected_m) = ratios.correct(row);
             smallest = smallest.inf(&shares);
-            let error = point.gain * corrected_mm - Vector3::from(row.reference_mm);
+            let error = point.gain * corrected_m - Vector3::from(row.reference);
             sum += error;
             here += error.component_mul(&error);
         }
         if problem.model.has_zero_deviation {
             let n = rows.len() as f64;
             let mean = sum / n;
-            let delta_mm = (to_delta * mean).map(|mm| range.clip(mm * 1e-3) * 1e3);
+            let delta_m = (to_delta * mean).map(|delta| range.clip(delta));
             // Sum of (error - zero)^2, free of the cancellation that zero^2 would bring.
-            let off = mean - point.gain * delta_mm;
+            let off = mean - point.gain * delta_m;
             here += off.component_mul(&off) * n - sum.component_mul(&mean);
         }
         squares += here;
     }
-    (smallest.min() > SHARE_MIN).then_some(squares * UM2_PER_MM2)
+    (smallest.min() > SHARE_MIN).then_some(squares / (UNIT * UNIT))
 }
 
-/// The gain, mm, mm, mrad per mm, and one offset of each movement that fit best, and the squares
+/// The gain, m, m, rad per m, and one offset of each movement that fit best, and the squares
 /// that they leave. With s' and q each less its mean over the movement, A = sum s' s'^T and
 /// B = sum s' q^T, G^T is A^-1 B.
 pub fn best_gain(
@@ -103,7 +100,7 @@ pub fn best_gain(
         let (mut signal_sum, mut reference_sum) = (Vector3::zeros(), Vector3::zeros());
         for row in rows {
             let (shares, s) = ratios.correct(row);
-            let q = Vector3::from(row.reference_mm);
+            let q = Vector3::from(row.reference);
             smallest = smallest.inf(&shares);
             signal_sum += s;
             reference_sum += q;
@@ -122,5 +119,5 @@ pub fn best_gain(
     let gain = mixed.tr_mul(&inverse(&signal)?);
     let left = squares - (gain * mixed).diagonal();
     // Rounding could make an exact fit negative.
-    Some((gain, left.map(|left| UM2_PER_MM2 * left.max(0.0))))
+    Some((gain, left.map(|left| left.max(0.0) / (UNIT * UNIT))))
 }

@@ -2,7 +2,7 @@
 
 use crate::estimator::model::Model;
 use crate::estimator::paper::Parameters;
-use crate::estimator::problem::Problem;
+use crate::estimator::problem::{Problem, UNIT};
 use crate::estimator::rows::FieldRow;
 use crate::estimator::synthetic_for_tests::Protocol;
 use hallstage_input::dataset::Dataset;
@@ -90,8 +90,8 @@ pub fn pose_by_the_runtime(
     row: &FieldRow,
     zero: &PlanarPose<f64>,
 ) -> [f64; 3] {
-    let signal = row.signal_mm.map(|s| s * 1e-3);
-    planar_pose(&to_rows(plane_inverse), signal, phi(parameters, row), zero).to_array()
+    let phi = phi(parameters, row);
+    planar_pose(&to_rows(plane_inverse), row.signal_m, phi, zero).to_array()
 }
 
 /// The fitness by the runtime's own model in f64, row by row.
@@ -108,8 +108,8 @@ pub fn fitness_by_the_runtime(
         let zero = zero_pose(&inverse, parameters.eta(), delta_m[number]);
         for row in &problem.rows.rows[movement] {
             let pose = pose_by_the_runtime(parameters, &inverse, row, &zero);
-            for (pose, reference) in pose.iter().zip(row.reference_mm) {
-                let error = pose * 1e6 - reference * 1e3;
+            for (pose, reference) in pose.iter().zip(row.reference) {
+                let error = (pose - reference) / UNIT;
                 cost += error * error;
             }
         }

@@ -68,7 +68,7 @@ fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDe
         for row in rows {
             let pose = pose_by_the_runtime(parameters, &inverse, row, &PlanarPose::ZERO);
             for k in 0..3 {
-                mean[k] += (pose[k] - row.reference_mm[k] * 1e-3) / rows.len() as f64;
+                mean[k] += (pose[k] - row.reference[k]) / rows.len() as f64;
             }
         }
         let range = &problem.stage.search.delta_m;

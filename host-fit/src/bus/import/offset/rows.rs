@@ -19,7 +19,7 @@ pub(super) struct ReferencedTick {
 impl Records<'_> {
     /// The rows of the fit, with the speed of the reference.
     pub(super) fn field_rows(&self, rows: &[ReferencedTick], clocks: &Clocks) -> Rows {
-        let hall_mm = self.stage.hall.m_per_count * 1e3;
+        let hall_m = self.stage.hall.m_per_count;
         let mut used = Vec::with_capacity(rows.len());
         let mut movements = Vec::new();
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
@@ -30,15 +30,15 @@ impl Records<'_> {
                 let vertical = self.vertical(&row.tick);
                 let at = |t_us| self.at(t_us, vertical);
                 let (before, after) = (at(t_us - half_us)?, at(t_us + half_us)?);
-                let per_second = 1e9 / self.period_us;
+                let change = |k: usize| (after.1[k] - before.1[k]) * 1e6 / self.period_us;
+                let rate = |k: usize| if k < 3 { change(k) } else { 0.0 };
                 (before.0 == after.0).then(|| FieldRow {
                     temperature_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
-                    signal_mm: row.tick.codes.hall.map(|code| hall_mm * f64::from(code)),
+                    signal_m: row.tick.codes.hall.map(|code| hall_m * f64::from(code)),
                     vertical,
-                    reference_mm: row.pose.map(|q| q * 1e3),
-                    rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
-                    vertical_rate: [0.0; 3],
+                    reference: row.pose,
+                    rate: std::array::from_fn(rate),
                     acceleration_m_s2: [0.0; 6],
                     weight: 1.0,
                 })
