@@ -6,7 +6,7 @@
 
 use super::log::LogError;
 use super::log::cell;
-use super::log::layout::{Kind, Quantity};
+use super::log::layout::{Dimension, Quantity};
 use super::log::table::Table;
 use super::log::time::Clock;
 use super::log::units;
@@ -113,10 +113,10 @@ impl LogColumn {
     }
 
     /// Its value in the table `[log]`, and whether its unit is known.
-    fn mapping(&self, kind: Kind) -> (String, bool) {
+    fn mapping(&self, kind: Dimension) -> (String, bool) {
         let name = quoted(&self.name);
         let unit = self.unit.as_deref().unwrap_or_default();
-        let is_plain = matches!(kind, Kind::Index | Kind::Code) && units::is_count(unit);
+        let is_plain = matches!(kind, Dimension::Index | Dimension::Code) && units::is_count(unit);
         let known = kind.unit(unit).is_some();
         match (is_plain || (known && self.in_name), known) {
             (true, _) => (name, true),
@@ -129,7 +129,7 @@ impl LogColumn {
     }
 
     /// Its unit in m, rad, us or V, if it is a unit of this kind.
-    fn scale(&self, kind: Kind) -> Option<f64> {
+    fn scale(&self, kind: Dimension) -> Option<f64> {
         self.unit.as_deref().and_then(|unit| kind.unit(unit))
     }
 
@@ -150,7 +150,7 @@ fn decide_by_neighbours(columns: &mut [LogColumn]) {
     if !has(Quantity::Time) {
         let is_time = |column: &&mut LogColumn| {
             let free = column.quantity.is_none();
-            free && column.step().is_some() && column.scale(Kind::Time).is_some()
+            free && column.step().is_some() && column.scale(Dimension::Time).is_some()
         };
         if let Some(time) = columns.iter_mut().find(is_time) {
             time.quantity = Some(Quantity::Time);
@@ -199,7 +199,7 @@ impl Lines {
     fn stage(&mut self, columns: &[LogColumn]) {
         let period_s = columns.iter().find_map(|column| {
             column.quantity.filter(|q| *q == Quantity::Time)?;
-            let period_us = column.step()? * column.scale(Kind::Time)?;
+            let period_us = column.step()? * column.scale(Dimension::Time)?;
             Some(period_us.round() / 1e6)
         });
         let lines = STAGE_TOML.lines().skip_while(|line| !line.starts_with('['));
@@ -238,7 +238,7 @@ impl Lines {
                 }
                 _ => {
                     let _ = writeln!(self.text, "{MARK}{line}");
-                    if key == "m_per_count" && held.any(|c| c.scale(Kind::Code).is_some()) {
+                    if key == "m_per_count" && held.any(|c| c.scale(Dimension::Code).is_some()) {
                         let key = format!("{MARK}volts_per_count = 3.125e-4");
                         self.line(&key, "V per code: the log holds voltages, the stage codes");
                     }
@@ -261,7 +261,7 @@ impl Lines {
                 .iter()
                 .filter(|column| column.quantity == Some(quantity))
                 .collect();
-            let (key, kind) = (quantity.key(), quantity.kind());
+            let (key, kind) = (quantity.key(), quantity.dimension());
             match named.as_slice() {
                 [] if quantity == Quantity::Movement => {
                     let _ = writeln!(

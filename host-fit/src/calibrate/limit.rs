@@ -2,11 +2,11 @@
 
 use hallstage_calibration::diagnose::refusal::Beyond;
 use hallstage_input::axis::PLANAR;
-use hallstage_input::log::layout::Kind;
+use hallstage_input::log::layout::Dimension;
 use std::str::FromStr;
 
 /// The kinds of units of X, Y, Rz.
-const KINDS: [Kind; 3] = [Kind::Length, Kind::Length, Kind::Angle];
+const KINDS: [Dimension; 3] = [Dimension::Length, Dimension::Length, Dimension::Angle];
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

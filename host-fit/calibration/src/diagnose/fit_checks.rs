@@ -7,7 +7,6 @@ use crate::judge::predicted::Predicted;
 use crate::judge::statistics;
 use crate::judge::verdict;
 use crate::words;
-use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Place, Severity};
 use hallstage_input::stage::Stage;
@@ -82,10 +81,9 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option
         motion_micro,
         unit: motion.micro_unit(),
     };
-    let axis = Channel::POSE[motion as usize];
     Some(
         Finding::new(kind)
-            .with_channel(axis)
+            .with_channel(motion)
             .with_severity(Severity::Refuse),
     )
 }

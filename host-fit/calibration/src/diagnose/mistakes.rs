@@ -7,11 +7,11 @@ use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
 
-/// A change of the rows: matrices for the three Hall signals, the reference and the vertical pose.
+/// A linear transform of the rows: matrices for the three Hall signals, the reference and the vertical pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Change(pub(super) [Matrix3<f64>; 3]);
+pub(super) struct Transform(pub(super) [Matrix3<f64>; 3]);
 
-impl Change {
+impl Transform {
     pub(super) fn nothing() -> Self {
         Self([Matrix3::identity(); 3])
     }
@@ -35,7 +35,7 @@ pub(super) struct Mistake {
     pub(super) penalty: f64,
     /// Whether other magnets than designed have the same effect.
     pub(super) may_be_magnets: bool,
-    pub(super) change: Change,
+    pub(super) change: Transform,
 }
 
 /// Factors per decade that are tried.
@@ -62,7 +62,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
         let Some(to_pose) = to_channels.try_inverse() else {
             continue;
         };
-        let change = |matrix: Matrix3<f64>| Change::of(side, to_pose * matrix * to_channels);
+        let change = |matrix: Matrix3<f64>| Transform::of(side, to_pose * matrix * to_channels);
         let [swapped, inverted] = SIDES[side];
         let (all, own) = (Channel::GROUPS[side], &Channel::SINGLE[3 * side..][..3]);
         for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
@@ -97,7 +97,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     // Rz of the reference, and Rx and Ry, are multiplied.
     let turned = |rz: f64, tilts: f64| {
         let diagonals = [[1.0; 3], [1.0, 1.0, rz], [1.0, tilts, tilts]];
-        Change(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
+        Transform(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
     };
     scales(&mut out, &Correction::BaselineScale, |by| turned(by, 1.0));
     scales(&mut out, &Correction::HallPlaces, |by| {
@@ -110,7 +110,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     out
 }
 
-const fn mistake(code: Code, correction: Correction, change: Change) -> Mistake {
+const fn mistake(code: Code, correction: Correction, change: Transform) -> Mistake {
     Mistake {
         code,
         correction,
@@ -122,7 +122,7 @@ const fn mistake(code: Code, correction: Correction, change: Change) -> Mistake 
 }
 
 /// One mistake for each factor.
-fn scales(out: &mut Vec<Mistake>, correction: &Correction, change: impl Fn(f64) -> Change) {
+fn scales(out: &mut Vec<Mistake>, correction: &Correction, change: impl Fn(f64) -> Transform) {
     let powers = (-FACTORS * POWERS..=FACTORS * POWERS).filter(|power| *power != 0);
     let any = powers.map(|power| {
         let factor = 10f64.powf(f64::from(power) / f64::from(FACTORS));
@@ -153,7 +153,7 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
             ..mistake(
                 Code::CapacitiveInverted,
                 correction,
-                Change::of(2, to_pose * gaps),
+                Transform::of(2, to_pose * gaps),
             )
         }));
     };

@@ -6,7 +6,7 @@
 //! must agree with the drawing, and the sensitivity must fall with the height at its place: b/a = y and c/a = -x.
 
 use super::limits::{MEANS_MAX, RARITY, ROUNDS, SPANS, UNDECIDED};
-use super::mistakes::{Change, Mistake, cause, mistakes};
+use super::mistakes::{Mistake, Transform, cause, mistakes};
 use crate::judge::identify::check_motion;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
@@ -66,7 +66,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let strange: Vec<Channel> = strange.map(|probe| Channel::SINGLE[probe]).collect();
     let spans = spans(dataset);
     // A probe along an axis that hardly moves shows all but a line.
-    let moves = beyond_motion(stage, &spans, &Change::nothing()) == 0.0;
+    let moves = beyond_motion(stage, &spans, &Transform::nothing()) == 0.0;
     if moves && !strange.is_empty() {
         let found = Finding::new(Kind::NotLinear {}).with_severity(Severity::Refuse);
         return Some(Finding {
@@ -75,8 +75,8 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
         });
     }
     let drawing = Drawing::new(stage);
-    let distance = |change: &Change| drawing.distance(&fitted, change);
-    let as_logged = distance(&Change::nothing());
+    let distance = |change: &Transform| drawing.distance(&fitted, change);
+    let as_logged = distance(&Transform::nothing());
     let mut rows = dataset.rows.iter();
     let mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
     // Chance does not lower the distance by more than this.
@@ -197,14 +197,14 @@ impl Drawing {
     }
 
     /// Sum of squared differences of three probes over tolerances and uncertainties of the fit.
-    fn distance(&self, fitted: &[Fitted; 3], change: &Change) -> f64 {
+    fn distance(&self, fitted: &[Fitted; 3], change: &Transform) -> f64 {
         let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
         let all = (0..3).map(|probe| of_probe(probe).unwrap_or(f64::INFINITY));
         all.sum()
     }
 
-    fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Change) -> Option<f64> {
-        let Change([signal, reference, vertical]) = change;
+    fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Transform) -> Option<f64> {
+        let Transform([signal, reference, vertical]) = change;
         let from = (0..3).find(|&from| signal[(probe, from)] != 0.0)?;
         let by_gain = reference.try_inverse()?.transpose() * signal[(probe, from)];
         let by_slope = vertical.try_inverse()?.transpose();
@@ -293,7 +293,7 @@ fn spans(dataset: &Dataset) -> [Matrix3<f64>; 2] {
 }
 
 /// The penalty for a correction that makes the motion much larger or smaller than declared.
-fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f64 {
+fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Transform) -> f64 {
     let mut sum = 0.0;
     for (half, by) in change.0[1..].iter().enumerate() {
         let products = by * spans[half] * by.transpose();

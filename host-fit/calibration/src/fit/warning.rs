@@ -9,7 +9,7 @@ use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::{Range, Stage};
 use hallstage_solver::estimator::least_squares::at_limit;
 use hallstage_solver::estimator::model::ParameterId;
-use hallstage_solver::estimator::motion::shown;
+use hallstage_solver::estimator::paper_terms::shown;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
 use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 

@@ -1,11 +1,11 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
 use crate::judge::statistics::PoseError;
+use hallstage_input::channel::Channel;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::model::{GAIN_TERMS, Model, ParameterId};
-use hallstage_solver::estimator::motion::Motion;
 use hallstage_solver::estimator::paper::{Parameters, THETA, search_box};
 use hallstage_solver::estimator::sandwich::Sandwich;
 use nalgebra::Vector3;
@@ -39,7 +39,7 @@ pub enum FitFailure {
     /// An axis does not move in the log.
     NoMotion {
         /// The motion that is missing.
-        motion: Motion,
+        motion: Channel,
         /// Peak-to-peak over the log, um or urad.
         span_micro: f64,
         /// Noise from sample to sample, um or urad.
@@ -61,14 +61,14 @@ pub enum FitFailure {
         /// The parameters, with their standard errors where there are any.
         parameters: Vec<(ParameterId, Option<f64>)>,
         /// The motions that show them.
-        motions: Vec<Motion>,
+        motions: Vec<Channel>,
     },
     /// The fitted model explains too little of the motion.
     NotDescribed {
         /// Name of the model.
         model: &'static str,
         /// The axis.
-        motion: Motion,
+        motion: Channel,
         /// rms error, um or urad.
         error_micro: f64,
         /// rms motion, um or urad.
@@ -100,7 +100,7 @@ pub fn check_motion(
             model: model.name,
         });
     }
-    for (axis, motion) in Motion::ALL.into_iter().enumerate() {
+    for (axis, motion) in Channel::POSE.into_iter().enumerate() {
         let needing = model.free().filter(|id| id.seen_in(stage) == motion);
         let parameters: Vec<String> = needing.map(|id| id.name()).collect();
         if parameters.is_empty() {
@@ -236,7 +236,7 @@ pub fn check_described(
         let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
         (squares / n).sqrt()
     });
-    for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
+    for (axis, motion) in Channel::POSE.into_iter().enumerate().take(3) {
         let moved = moved[axis];
         let error = errors.axes[axis].rms;
         let most = if model.has_zero_deviation {

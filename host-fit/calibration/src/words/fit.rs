@@ -3,8 +3,9 @@
 use crate::fit::{Fit, FitError, ModelReason};
 use crate::judge::identify::FitFailure;
 use hallstage_input::axis::sign;
+use hallstage_input::channel::Channel;
 use hallstage_solver::estimator::error::FieldFitError;
-use hallstage_solver::estimator::motion::{Motion, shown};
+use hallstage_solver::estimator::paper_terms::shown;
 use hallstage_solver::estimator::service::Comparison;
 use hallstage_solver::solve::search::run::StopReason;
 use hallstage_solver::solve::{SolveError, Stopped};
@@ -46,7 +47,7 @@ impl Display for FitFailure {
                 noise_micro,
                 parameters,
             } => {
-                let (axis, unit) = (motion.axis(), sign(motion.micro_unit()));
+                let (axis, unit) = (motion.title(), sign(motion.micro_unit()));
                 let (record, without) = (recording(*motion), without(*motion));
                 write!(
                     f,
@@ -95,7 +96,7 @@ impl Display for FitFailure {
                 error_micro,
                 motion_micro,
             } => {
-                let (axis, unit) = (motion.axis(), sign(motion.micro_unit()));
+                let (axis, unit) = (motion.title(), sign(motion.micro_unit()));
                 write!(
                     f,
                     "the fitted model ({model}) does not describe this log: its errors are {error_micro:.1} {unit} rms in {axis}, the motion itself has {motion_micro:.1} {unit} rms. Check the columns, the order and signs of the sensors and the scales in stage.toml, and record a log where the stage moves along {axis}"
@@ -106,24 +107,21 @@ impl Display for FitFailure {
 }
 
 /// What to record, after "record" or "record independent".
-const fn recording(motion: Motion) -> &'static str {
-    match motion {
-        Motion::X => "X motion",
-        Motion::Y => "Y motion",
-        Motion::Rz => "Rz motion",
-        Motion::Z => "movements at different heights Z",
-        Motion::Rx => "movements at different tilts Rx",
-        Motion::Ry => "movements at different tilts Ry",
+fn recording(axis: Channel) -> String {
+    match axis {
+        Channel::Z => "movements at different heights Z".to_owned(),
+        Channel::Rx | Channel::Ry => format!("movements at different tilts {}", axis.title()),
+        _ => format!("{} motion", axis.title()),
     }
 }
 
 /// The way out where a log has no vertical motion.
-const fn without(motion: Motion) -> &'static str {
-    match motion {
-        Motion::X | Motion::Y | Motion::Rz => "",
-        Motion::Z | Motion::Rx | Motion::Ry => {
+const fn without(axis: Channel) -> &'static str {
+    match axis {
+        Channel::Z | Channel::Rx | Channel::Ry => {
             ", or fit a model without vertical terms (--model 30)"
         }
+        _ => "",
     }
 }
 

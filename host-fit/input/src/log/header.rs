@@ -3,7 +3,7 @@
 use super::ReferenceUse;
 use super::cell::shown;
 use super::error::{LogError, LogProblem, Place};
-use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
+use super::layout::{Dimension, LogLayout, Meaning, Quantity, UnitFault};
 use super::table::Head;
 use crate::stage::Stage;
 
@@ -149,10 +149,10 @@ impl<'a> Header<'a> {
             Meaning::Exact(quantity) => (quantity, None),
             Meaning::WithUnit(quantity, unit) => {
                 let quantity = quantity.in_unit(unit.or(Some(below)));
-                let kind = quantity.kind();
+                let kind = quantity.dimension();
                 let fallback = match kind {
-                    Kind::Index | Kind::Code => Some(below),
-                    Kind::Time if self.table.is_date(cell) => Some("iso"),
+                    Dimension::Index | Dimension::Code => Some(below),
+                    Dimension::Time if self.table.is_date(cell) => Some("iso"),
                     _ => (!below.is_empty()).then_some(below),
                 };
                 let Some(unit) = unit.or(fallback) else {
@@ -190,10 +190,10 @@ impl<'a> Header<'a> {
     /// Whether the unit below the header contradicts the column: it is a unit of the same kind, and so is the scale of
     /// the column.
     fn disagrees(&self, quantity: Quantity, scale: f64, below: &str) -> bool {
-        let kind = quantity.kind();
+        let kind = quantity.dimension();
         match (kind, kind.unit(below)) {
             (_, None) => false,
-            (Kind::Code, Some(_)) => self.layout.scale(quantity, below) != Ok(scale),
+            (Dimension::Code, Some(_)) => self.layout.scale(quantity, below) != Ok(scale),
             (_, Some(unit)) => unit != scale.abs() && kind.has_unit(scale.abs()),
         }
     }

@@ -17,9 +17,9 @@
 
 use super::units;
 
-/// The kind of the numbers in a column.
+/// The dimension of the numbers in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum Dimension {
     /// A whole number that names something.
     Index,
     /// A time; scales lead to us.
@@ -39,7 +39,7 @@ struct Entry {
     key: &'static str,
     /// Its column in a log, unless `[log]` names another.
     default_column: &'static str,
-    kind: Kind,
+    kind: Dimension,
     /// The table of `stage.toml` that describes its converter; empty if it has none.
     converter: &'static str,
     /// Its description in a draft of `stage.toml`.
@@ -65,7 +65,7 @@ macro_rules! quantities {
         static TABLE: [Entry; Quantity::ALL.len()] = [$(Entry {
             key: $key,
             default_column: $column,
-            kind: Kind::$kind,
+            kind: Dimension::$kind,
             converter: $converter,
             meaning: $meaning,
             words: &[$($word),*],
@@ -144,8 +144,8 @@ impl Quantity {
         self.entry().meaning
     }
 
-    /// The kind of its numbers.
-    pub fn kind(self) -> Kind {
+    /// The dimension of its numbers.
+    pub fn dimension(self) -> Dimension {
         self.entry().kind
     }
 
@@ -160,7 +160,7 @@ impl Quantity {
 
     /// The same quantity; but a capacitive column in a unit of length holds a gap, and no codes.
     pub(super) fn in_unit(self, unit: Option<&str>) -> Self {
-        let is_length = unit.is_some_and(|unit| Kind::Length.unit(unit).is_some());
+        let is_length = unit.is_some_and(|unit| Dimension::Length.unit(unit).is_some());
         let gap = Self::GAPS.iter().position(|gap| *gap == self);
         match gap.filter(|_| is_length) {
             Some(gap) => Self::GAP_LENGTHS[gap],
@@ -220,7 +220,7 @@ impl Default for LogLayout {
             let name = quantity.default_column();
             Column {
                 name: name.to_owned(),
-                scale: quantity.kind().unit_in_name(name).unwrap_or(1.0),
+                scale: quantity.dimension().unit_in_name(name).unwrap_or(1.0),
             }
         };
         Self {
@@ -279,8 +279,8 @@ impl LogLayout {
 
     /// m, rad, us or codes per `symbol` of a quantity.
     pub(crate) fn scale(&self, quantity: Quantity, symbol: &str) -> Result<f64, UnitFault> {
-        let kind = quantity.kind();
-        if matches!(kind, Kind::Code | Kind::Index) && units::is_count(symbol) {
+        let kind = quantity.dimension();
+        if matches!(kind, Dimension::Code | Dimension::Index) && units::is_count(symbol) {
             return Ok(1.0);
         }
         let unit = kind.unit(symbol).ok_or(UnitFault::Unknown)?;

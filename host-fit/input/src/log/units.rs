@@ -1,7 +1,7 @@
 //! Units, and how headers write them: `ifm_x_um`, `X [um]`, `X (um)`, `X/um`, with either micro
 //! sign.
 
-use super::layout::Kind;
+use super::layout::Dimension;
 use std::borrow::Cow;
 
 const LENGTHS: [(&str, f64); 5] = [
@@ -49,11 +49,16 @@ pub fn is_count(symbol: &str) -> bool {
 
 /// Whether the symbol is a unit of any kind.
 pub(super) fn is_known(symbol: &str) -> bool {
-    let kinds = [Kind::Length, Kind::Angle, Kind::Time, Kind::Code];
+    let kinds = [
+        Dimension::Length,
+        Dimension::Angle,
+        Dimension::Time,
+        Dimension::Code,
+    ];
     kinds.into_iter().any(|kind| kind.unit(symbol).is_some())
 }
 
-impl Kind {
+impl Dimension {
     const fn table(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Length => &LENGTHS,

@@ -87,7 +87,7 @@ fn column<'d>(
     layout: &LogLayout,
     quantity: Quantity,
 ) -> Result<Option<(Value<'d>, Column)>, StageError> {
-    let (key, kind) = (quantity.key(), quantity.kind());
+    let (key, kind) = (quantity.key(), quantity.dimension());
     let table = format!("log.{key}");
     let column = match document.get("log", key) {
         None => return Ok(None),

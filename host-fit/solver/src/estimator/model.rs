@@ -1,6 +1,7 @@
 //! The models as a fit sees them: which terms they have and which are fitted.
 
-use super::motion::{MODEL_31, Motion, Term};
+use super::paper_terms::{MODEL_31, PaperTerm};
+use hallstage_input::channel::Channel;
 use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -119,13 +120,13 @@ pub struct ParameterId {
     /// Its place in the order of [`Model::parameters`].
     pub index: usize,
     /// What it is.
-    pub term: &'static Term,
+    pub term: &'static PaperTerm,
     /// Probe, 0 to 2 for A to C.
     pub probe: usize,
 }
 
 impl ParameterId {
-    const fn new(place: usize, term: &'static Term, probe: usize) -> Self {
+    const fn new(place: usize, term: &'static PaperTerm, probe: usize) -> Self {
         Self {
             index: 3 * place + probe,
             term,
@@ -138,14 +139,14 @@ impl ParameterId {
         format!("{}_{}", self.term.name, ["a", "b", "c"][self.probe])
     }
 
-    /// The motion that shows it on this stage: X and Y change places for a probe that is mounted
+    /// The axis that has to move to show it on this stage: X and Y change places for a probe that is mounted
     /// nearer to the other axis than in the paper.
-    pub fn seen_in(&self, stage: &Stage) -> Motion {
+    pub fn seen_in(&self, stage: &Stage) -> Channel {
         let turned = libm::sin(stage.probes[self.probe].theta_rad).abs() > FRAC_1_SQRT_2;
         match self.term.seen_in[self.probe] {
-            Motion::X if turned => Motion::Y,
-            Motion::Y if turned => Motion::X,
-            motion => motion,
+            Channel::X if turned => Channel::Y,
+            Channel::Y if turned => Channel::X,
+            axis => axis,
         }
     }
 

@@ -5,7 +5,7 @@
 //! estimate has no bias from it, since residuals and derivatives are evaluated at each row.
 
 use super::derivatives::{SAMPLES, SIDE_US, second_derivatives};
-use super::dynamics::{ARM_M, Dynamics};
+use super::dynamics::{ARMS_M, Dynamics};
 use crate::estimator::robust::HALF;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage;
@@ -102,14 +102,7 @@ impl Rows {
     /// Rows in time order, and where each movement stands among them.
     pub fn from_movements(rows: Vec<FieldRow>, movements: Vec<Range<usize>>) -> Self {
         let (planar_range, vertical_range) = ranges(&rows, &movements);
-        let most: [f64; 6] = std::array::from_fn(|axis| {
-            2.0 * MOTION_MAX
-                * if axis < 3 {
-                    planar_range[axis]
-                } else {
-                    vertical_range[axis - 3]
-                }
-        });
+        let most = six(planar_range, vertical_range).map(|range| 2.0 * MOTION_MAX * range);
         let mut blocks: Vec<Range<usize>> = Vec::new();
         let mut by_movement = Vec::with_capacity(movements.len());
         for movement in movements {
@@ -117,14 +110,8 @@ impl Rows {
             let mut start = movement.start;
             for k in movement.clone() {
                 let (a, b) = (&rows[start], &rows[k]);
-                let moved = |axis: usize| {
-                    let (from, to) = if axis < 3 {
-                        (a.reference[axis], b.reference[axis])
-                    } else {
-                        (a.vertical[axis - 3], b.vertical[axis - 3])
-                    };
-                    (to - from).abs() > most[axis]
-                };
+                let [from, to] = [a, b].map(|row| six(row.reference, row.vertical));
+                let moved = |axis: usize| (to[axis] - from[axis]).abs() > most[axis];
                 if k - start >= ROWS_MAX || b.time_s - a.time_s > TIME_MAX_S || (0..6).any(moved) {
                     blocks.push(start..k);
                     start = k;
@@ -181,7 +168,8 @@ impl Rows {
     pub fn thinned(&self, most: usize) -> Self {
         let movements: Vec<Range<usize>> = self.movement_rows().collect();
         let moved: Vec<f64> = (movements.par_iter())
-            .map(|rows| moved(&self.rows[rows.clone()]))
+            .map(|rows| ranges(&self.rows, std::slice::from_ref(rows)).0)
+            .map(|ranges| ranges.into_iter().fold(0.0, f64::max))
             .collect();
         let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
         let moving = moved.iter().filter(|moved| **moved > idle).count();
@@ -237,7 +225,7 @@ impl FieldRow {
 
 fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> FieldRow {
     let row = &dataset.rows[index];
-    let [x, y, rz, z, rx, ry] = acceleration(dataset, index, trusted);
+    let acceleration = acceleration(dataset, index, trusted);
     let temperature = &dataset.temperature;
     let temperature_mc = row.frame.temperature_mc();
     let changes_k = temperature.changes_k(temperature_mc);
@@ -249,14 +237,18 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
         vertical: row.vertical,
         reference: row.reference,
         rate: speed(dataset, index, trusted),
-        acceleration_m_s2: [x, y, ARM_M * rz, z, ARM_M * rx, ARM_M * ry],
+        acceleration_m_s2: std::array::from_fn(|axis| ARMS_M[axis] * acceleration[axis]),
         weight,
     }
 }
 
-fn pose(row: &Row) -> [f64; 6] {
-    let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
+/// Numbers of X, Y, Rz and of Z, Rx, Ry.
+const fn six([x, y, rz]: [f64; 3], [z, rx, ry]: [f64; 3]) -> [f64; 6] {
     [x, y, rz, z, rx, ry]
+}
+
+fn pose(row: &Row) -> [f64; 6] {
+    six(row.reference, row.vertical)
 }
 
 /// Speed of X, Y, Rz, Z, Rx, Ry at a row, SI: the difference of its neighbours.
@@ -312,15 +304,6 @@ pub fn planar_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<[[f64; 3]; 2]> 
     (0..dataset.rows.len()).into_par_iter().map(at).collect()
 }
 
-/// How far a movement moves: the largest range of X, Y (m) and Rz (rad) by the reference.
-fn moved(rows: &[FieldRow]) -> f64 {
-    let span = |axis: usize| {
-        let references = rows.iter().map(|row| row.reference[axis]);
-        stage::Range::around(references).width()
-    };
-    (0..3).map(span).fold(0.0, f64::max)
-}
-
 fn mean_row(rows: &[FieldRow]) -> FieldRow {
     let weight: f64 = rows.iter().map(|row| row.weight).sum();
     let mean = |of: &dyn Fn(&FieldRow) -> f64| {
@@ -341,17 +324,13 @@ fn mean_row(rows: &[FieldRow]) -> FieldRow {
 }
 
 fn ranges(rows: &[FieldRow], movements: &[Range<usize>]) -> ([f64; 3], [f64; 3]) {
-    let mut planar = [0.0f64; 3];
-    let mut vertical = [0.0f64; 3];
-    for movement in movements {
+    let (mut planar, mut vertical) = ([0.0f64; 3], [0.0f64; 3]);
+    for rows in movements.iter().map(|movement| &rows[movement.clone()]) {
         for axis in 0..3 {
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for row in &rows[movement.clone()] {
-                low = low.min(row.reference[axis]);
-                high = high.max(row.reference[axis]);
-                vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
-            }
-            planar[axis] = planar[axis].max(0.5 * (high - low));
+            let range = stage::Range::around(rows.iter().map(|row| row.reference[axis]));
+            planar[axis] = planar[axis].max(0.5 * range.width());
+            let magnitudes = rows.iter().map(|row| row.vertical[axis].abs());
+            vertical[axis] = magnitudes.fold(vertical[axis], f64::max);
         }
     }
     (planar, vertical)

@@ -3,7 +3,7 @@
 use super::ImportError;
 use hallstage_input::log::cell::{CellFault, WHOLE_MAX};
 use hallstage_input::log::header::{Header, Source, UnknownColumns};
-use hallstage_input::log::layout::{Kind, Quantity};
+use hallstage_input::log::layout::{Dimension, Quantity};
 use hallstage_input::log::order::{Order, OrderCells};
 use hallstage_input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
 use hallstage_input::log::table::Table;
@@ -156,8 +156,8 @@ impl Cells {
         let [time] = header.all([Quantity::Time])?;
         let (quantities, [a, b, c]) = header.one_of(&Quantity::REFERENCES)?;
         let value = |quantity: Quantity, source: Source| {
-            let (limit, unit) = match quantity.kind() {
-                Kind::Angle => (ROTATION_MAX_RAD, "rad"),
+            let (limit, unit) = match quantity.dimension() {
+                Dimension::Angle => (ROTATION_MAX_RAD, "rad"),
                 _ => (displacement_max_m(stage), "m"),
             };
             Value {
