@@ -197,12 +197,8 @@ pub fn recalibrate(
     let judged =
         |set: &ParameterSet| Decoded::new(set, dataset).judge(dataset, stage, Zeros::Refit);
     let judgement_before = judged(old);
-    let (_, bad) = signal_findings(
-        dataset,
-        stage,
-        &columns(dataset, stage),
-        (&old_parameters, 0.0),
-    );
+    let columns = columns(dataset, stage);
+    let (_, bad) = signal_findings(dataset, stage, &columns);
     let covariance = known.map(|known| &known.covariance);
     let drift = known.map_or(USUAL_DRIFT, |known| known.noise.drift);
     let update = update(

@@ -17,13 +17,17 @@ pub fn channels(columns: &[Column], dataset: &Dataset) -> Vec<Group> {
             "range" => Figure::from_iter(column.range_m.map(um)),
             "step" => um(column.step_m),
             "noise" => column.white_noise_m.map(um),
-            "to_siblings" => column.to_siblings.map(ratio),
-            "falls" => column.falls.map(|falls| Figure::from_iter(falls.map(ratio))),
+            "noise_to_others" => column.to_siblings.map(ratio),
+            "shared_noise" => (column.shared > 0.0).then(|| ratio(column.shared)),
+            "low_pass" => column.is_low_passed,
             "rows_per_value" => column.slow.map(|slow| slow.every),
             "rows_between" => column.slow.map(|slow| between(slow.is_held)),
             "straight_rows" => column.straight.as_ref().map(ExactSizeIterator::len),
             "stuck_bits" => Figure::from_iter(column.stuck_bits.iter().copied()),
             "overflows" => column.overflows.map(|(_, times)| times),
+            "outliers" => column.outliers.len(),
+            "line_at" => column.line.map(|line| figure((line.frequency_hz * 10.0).round() * 0.1, "Hz")),
+            "line" => column.line.map(|line| um(line.amplitude_m)),
         }
     };
     columns.iter().map(of_column).collect()

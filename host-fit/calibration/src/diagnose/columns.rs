@@ -1,13 +1,13 @@
 //! Findings about each channel alone, and their cost in service over the noise floor of probes without a fault.
 
-use super::limits::severity_of_share;
+use super::limits::{CLEAR, severity_of_share};
 use super::slopes::Slopes;
 use crate::judge::predicted::{declared_service, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, probe_noise_m};
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Finding, Kind, Severity};
+use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::parameters::FieldParameters;
@@ -15,33 +15,29 @@ use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::service::{Service, service_poses};
 use nalgebra::Vector3;
 
-/// The noise of a probe is white, with 0.21 of the fall of a random walk. A filter is there from this fall.
-const FALL_OF_PROBE: f64 = 0.45;
-/// The noise of a beam is drift and white noise. A filter is there if it falls by more than a random walk from 75 to
-/// 200 Hz, and this many times as much from 20 to 75 Hz. A low pass of 30 Hz has 2.7 and is harmless.
-const FALLS_OF_BEAM: [f64; 2] = [3.0, 1.0];
 /// An error of the reference that follows the motion bends a calibration by this part of it: measured on references that
 /// are held for 5 and 10 rows or interpolated over 5 to 25.
 const BENDS: f64 = 0.75;
-
-/// The noise of a beam is the noise of its reading, and no motion, below this part of the noise of a probe.
-const QUIET: f64 = 1.0 / 200.0;
 
 /// The effect of a fault.
 enum Effect {
     /// A probe or a gap has an error with this variance in service, m2.
     Variance(f64),
+    /// The same, and it is in the covariance of the channels already.
+    Counted(f64),
     /// The reference has an error that follows the motion, rms m.
     Bent(f64),
-    /// Its size is not known.
+    /// Its size is not known, or there is none in service.
     Unknown,
 }
 
 /// The faults of the channels of all logs, one for each channel.
 pub(super) struct ColumnFaults {
     pub(super) findings: Vec<Finding>,
-    /// Variances that they add to X, Y, Rz in service: m2, m2, rad2.
-    pub(super) added: [f64; 3],
+    /// Variances of X, Y, Rz in service, m2, m2, rad2, because a bent reference bends the calibration, ...
+    pub(super) bent: [f64; 3],
+    /// ... and because sensors have these faults in service, too.
+    pub(super) stays: [f64; 3],
 }
 
 impl ColumnFaults {
@@ -55,63 +51,145 @@ impl ColumnFaults {
         let probes_m = probe_noise_m(columns).unwrap_or([stage.hall.m_per_count; 3]);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
         let service = declared_service(stage, parameters, probes_m);
-        let service = service.map(|service| {
-            let floor = service.by_signals(probes_m.map(|m| m * m));
-            (floor, variances(&service, stage, parameters))
+        let effects = service.map(|service| PoseEffects::new(&service, stage, parameters));
+        let effects = effects.unwrap_or_default();
+        let floor = effects.variances(&PROBES, |i, j| match i == j {
+            true => probes_m[i] * probes_m[i],
+            false => 0.0,
         });
-        let (floor, by_channel) = service.unwrap_or_default();
-        let (mut findings, mut added) = (Vec::new(), [0.0; 3]);
-        for column in columns {
-            let log = &dataset.logs[column.log];
-            let mut all = Channel::SINGLE.iter().zip(by_channel);
-            let by = all.find(|(channel, _)| **channel == column.channel);
-            let in_service = |effect: Effect| match effect {
-                Effect::Variance(m2) => Some(by?.1.map(|by| by * m2)),
-                Effect::Bent(m) => Some(floor.map(|floor| floor * (BENDS * m / noise_m).powi(2))),
-                Effect::Unknown => None,
-            };
-            let with_cost = |(kind, effect): (Kind, Effect)| {
-                let mut found = Finding::new(kind).with_channel(column.channel);
-                found.log = (dataset.logs.len() > 1).then(|| log.name());
-                let Some(own) = in_service(effect) else {
-                    return (found, [0.0; 3]);
-                };
-                let ratio = |axis: usize| (1.0 + own[axis] / floor[axis]).sqrt();
-                let cost = [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max);
-                (found.with_severity(severity(cost)).with_cost(cost), own)
-            };
-            // Harmless properties are in the table of channels only.
-            let faults = faults(column, noise_m, log.rows.len()).map(with_cost);
-            let worst = faults.filter(|(found, _)| found.severity > Severity::Note);
-            for (found, own) in worst.take(1) {
-                findings.push(found);
-                for (all, own) in added.iter_mut().zip(own) {
-                    // The beams are slow together.
-                    let is_beam = column.channel.is_beam();
-                    *all = if is_beam { own.max(*all) } else { own + *all };
+        let cost = |own: [f64; 3]| {
+            let ratio = |axis: usize| (1.0 + own[axis].max(0.0) / floor[axis]).sqrt();
+            [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max)
+        };
+        let mut out = Self {
+            findings: Vec::new(),
+            bent: [0.0; 3],
+            stays: [0.0; 3],
+        };
+        for (log, source) in dataset.logs.iter().enumerate() {
+            let own: Vec<&Column> = columns.iter().filter(|column| column.log == log).collect();
+            let mut stays = [0.0; 3];
+            for kind in own.chunks(3) {
+                let before = out.findings.len();
+                for column in kind {
+                    let faults = faults(column, noise_m, source.rows.len());
+                    let with_effect = |(kind, effect): (Kind, Effect)| {
+                        let found = Finding::new(kind).with_channel(column.channel);
+                        let own = match effect {
+                            Effect::Variance(m2) | Effect::Counted(m2) => {
+                                effects.variances(&[column.channel], |_, _| m2)
+                            }
+                            Effect::Bent(m) => floor.map(|of| of * (BENDS * m / noise_m).powi(2)),
+                            Effect::Unknown => return (found, effect, [0.0; 3]),
+                        };
+                        let (cost, is_bent) = (cost(own), matches!(effect, Effect::Bent(_)));
+                        // A calibration is right though a sensor is not.
+                        let worst = if is_bent {
+                            Severity::Refuse
+                        } else {
+                            Severity::Warn
+                        };
+                        let severity = severity(cost).min(worst);
+                        (found.with_severity(severity).with_cost(cost), effect, own)
+                    };
+                    // Harmless properties are in the table of channels only.
+                    let mut felt = faults.map(with_effect);
+                    let felt = felt.find(|(found, ..)| found.severity > Severity::Note);
+                    let Some((found, effect, own)) = felt else {
+                        continue;
+                    };
+                    let first = column
+                        .outliers
+                        .first()
+                        .filter(|_| found.code() == Code::Outliers);
+                    out.findings.push(match first {
+                        Some((row, _)) => {
+                            let row = &dataset.rows[source.rows.start + row];
+                            let movement = &dataset.movements[row.movement];
+                            found.with_place(dataset.movement_name(movement), row.t_us)
+                        }
+                        None => found,
+                    });
+                    match effect {
+                        Effect::Variance(_) => add(&mut stays, own),
+                        // The beams are slow together.
+                        Effect::Bent(_) => most(&mut out.bent, own),
+                        Effect::Counted(_) | Effect::Unknown => {}
+                    }
+                }
+                let channels: Vec<Channel> = kind.iter().map(|column| column.channel).collect();
+                let beyond = effects.variances(&channels, |i, j| kind[i].beyond_m2[j]);
+                add(&mut stays, beyond);
+                let shared = kind.iter().map(|column| column.shared).fold(0.0, f64::max);
+                let is_new = shared > 0.0 || out.findings.len() == before;
+                if severity(cost(beyond)) > Severity::Note && is_new {
+                    let percent = 100.0 * shared;
+                    let found = Finding::new(Kind::GroupNoise { percent });
+                    let group = Channel::GROUPS[kind[0].channel as usize / 3];
+                    out.findings
+                        .push(found.with_channel(group).with_cost(cost(beyond)));
+                }
+                for found in &mut out.findings[before..] {
+                    found.log = (dataset.logs.len() > 1).then(|| source.name());
                 }
             }
+            // Service has the sensors of one log.
+            most(&mut out.stays, stays);
         }
-        Self { findings, added }
+        out
     }
 }
 
-/// By channel, mean over the poses of service: the variances of X, Y, Rz by a variance of the channel; zeros for
-/// beams, which service does not have.
-fn variances(service: &Service, stage: &Stage, parameters: &FieldParameters) -> [[f64; 3]; 9] {
-    let slopes = Slopes::new(stage, probes(parameters));
-    let share = 1.0 / service.poses.len() as f64;
-    let mut sums = [[0.0; 3]; 9];
-    for ((planar, vertical), pose) in service_poses(service_range(stage)).zip(&service.poses) {
-        let by_channel = slopes.at(planar, vertical);
-        for (sums, signals) in sums.iter_mut().zip(by_channel) {
-            for (sum, by_signal) in sums.iter_mut().zip(&pose.by_signal) {
-                *sum += share * signals.dot(&Vector3::from(*by_signal)).powi(2);
+fn add(all: &mut [f64; 3], own: [f64; 3]) {
+    all.iter_mut().zip(own).for_each(|(all, own)| *all += own);
+}
+
+fn most(all: &mut [f64; 3], own: [f64; 3]) {
+    all.iter_mut()
+        .zip(own)
+        .for_each(|(all, own)| *all = own.max(*all));
+}
+
+/// By pose of service and channel: the errors of X, Y, Rz by an error of the channel; none for beams, which service does not
+/// have.
+#[derive(Default)]
+struct PoseEffects(Vec<[Vector3<f64>; 9]>);
+
+impl PoseEffects {
+    fn new(service: &Service, stage: &Stage, parameters: &FieldParameters) -> Self {
+        let slopes = Slopes::new(stage, probes(parameters));
+        let poses = service_poses(service_range(stage)).zip(&service.poses);
+        let effects = poses.map(|((planar, vertical), pose)| {
+            let by_channel = slopes.at(planar, vertical);
+            let by_signal = pose.by_signal.map(Vector3::from);
+            let by_error =
+                |signals: Vector3<f64>| Vector3::from(by_signal.map(|by| by.dot(&signals)));
+            let mut by_channel = by_channel.map(by_error);
+            by_channel[3..6].fill(Vector3::zeros());
+            by_channel
+        });
+        Self(effects.collect())
+    }
+
+    /// The mean variances of X, Y, Rz by errors of channels with this covariance.
+    fn variances(
+        &self,
+        channels: &[Channel],
+        covariance: impl Fn(usize, usize) -> f64,
+    ) -> [f64; 3] {
+        let share = 1.0 / self.0.len().max(1) as f64;
+        let mut sums = Vector3::zeros();
+        for (i, a) in channels.iter().enumerate() {
+            for (j, b) in channels.iter().enumerate() {
+                let products = self
+                    .0
+                    .iter()
+                    .map(|by| by[*a as usize].component_mul(&by[*b as usize]));
+                sums += products.sum::<Vector3<f64>>() * (share * covariance(i, j));
             }
         }
+        sums.into()
     }
-    sums[3..6].fill([0.0; 3]);
-    sums
 }
 
 /// The faults of a channel of a log with `rows` rows, causes before their consequences; the Hall probes have this noise.
@@ -143,12 +221,6 @@ fn faults(
         is_held: slow.is_held,
         error_um: 1e6 * slow.error_m,
     };
-    let [low, high] = column.falls.unwrap_or_default();
-    let is_quiet = noise_m < QUIET * probe_noise_m;
-    let is_filtered = match is_beam {
-        true => is_quiet && low > FALLS_OF_BEAM[0] && high > FALLS_OF_BEAM[1],
-        false => PROBES.contains(&column.channel) && high > FALL_OF_PROBE,
-    };
     // At lower rates motion is in the differences.
     let shows_noise = column.falls.is_some() && !column.is_rounded();
     let is_noisy = |ratio: &f64| *ratio > NOISY && !is_beam && shows_noise;
@@ -156,6 +228,26 @@ fn faults(
         let noise_um = 1e6 * noise_m;
         let beyond_m2 = noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio));
         (Kind::Noisy { noise_um, ratio }, Effect::Variance(beyond_m2))
+    };
+    let own_m2 = column.beyond_m2[column.channel as usize % 3];
+    let line_m2 = column
+        .line
+        .map_or(0.0, |line| 0.5 * line.amplitude_m * line.amplitude_m);
+    let in_service = |m2: f64| match is_beam {
+        true => Effect::Unknown,
+        false => Effect::Counted(m2.max(0.0)),
+    };
+    let hum = column.line.map(|line| Kind::Hum {
+        frequency_hz: line.frequency_hz,
+        amplitude_um: 1e6 * line.amplitude_m,
+    });
+    // Smaller errors of a beam are below the noise of the probes.
+    let least_m = if is_beam { CLEAR * probe_noise_m } else { 0.0 };
+    let errors_m = column.outliers.iter().map(|(_, error_m)| error_m.abs());
+    let errors_m: Vec<f64> = errors_m.filter(|error_m| *error_m > least_m).collect();
+    let outliers = Kind::OutlierRows {
+        rows: errors_m.len(),
+        largest_um: 1e6 * errors_m.iter().copied().fold(0.0, f64::max),
     };
     let filled = column.straight.as_ref().map(ExactSizeIterator::len);
     let share = |filled: usize| severity_of_share(filled as f64 / rows as f64);
@@ -173,7 +265,10 @@ fn faults(
         is_coarse.then_some((steps, of_steps)),
         is_stuck.then_some((stuck, Effect::Variance(stuck_m2))),
         column.slow.map(|rate| (slow(rate), of_rate(rate))),
-        (is_filtered && column.slow.is_none()).then_some((Kind::LowPass {}, Effect::Unknown)),
+        (column.is_low_passed && column.slow.is_none())
+            .then_some((Kind::LowPass {}, Effect::Unknown)),
+        hum.map(|hum| (hum, in_service(line_m2))),
+        (!errors_m.is_empty()).then(|| (outliers, in_service(own_m2 - line_m2))),
         column.to_siblings.filter(is_noisy).map(noisy),
         filled.map(|rows| (Kind::Filled { rows }, Effect::Unknown)),
     ];
@@ -268,11 +363,84 @@ mod tests {
 
     #[test]
     fn a_noisy_probe_costs_its_excess_over_its_siblings() {
-        let noisy = |k: usize, row: &mut Row| {
-            row.frame.codes.hall[1] += [40, -40, 0, 37, -31, 5, -26][k * k % 7]
-        };
+        let noisy = |_: usize, row: &mut Row| row.frame.codes.hall[1] += random(row.t_us, 30);
         let (code, channel, cost) = only(noisy);
         assert_eq!((code, channel), (Code::Noisy, Channel::HallB));
         assert!(cost > Some(2.0), "{cost:?}");
+    }
+
+    /// Even numbers with this deviation, by the time.
+    fn random(t_us: i64, deviation: i32) -> i32 {
+        let mixed = (t_us as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 33;
+        let uniform = mixed as f64 / 2f64.powi(31) - 0.5;
+        (12f64.sqrt() * uniform * f64::from(deviation)).round() as i32
+    }
+
+    /// The noise of all probes alike is 4 times their own, and a code of 4 times the noise is an outlier in 1 % of the rows.
+    #[test]
+    fn what_a_sensor_shows_in_the_log_stays_in_service() {
+        let ratio = |found: &ColumnFaults| found.stays.map(|m2| m2.sqrt() * 1e6);
+        let shared = faults_of(|_, row| {
+            let codes = random(row.t_us, 32);
+            row.frame
+                .codes
+                .hall
+                .iter_mut()
+                .for_each(|code| *code += codes);
+        });
+        let [found] = &shared.findings[..] else {
+            panic!("{:#?}", shared.findings);
+        };
+        assert_eq!(
+            (found.code(), found.channels[0]),
+            (Code::Noisy, Channel::Halls)
+        );
+        assert!(found.cost > Some(4.0), "{found:?}");
+        assert!(found.severity == Severity::Warn, "the calibration is right");
+        let spikes = |k: usize, row: &mut Row| {
+            row.frame.codes.hall[0] += if k % 101 == 3 { 400 } else { 0 };
+            row.reference[0] += if k % 101 == 9 { 30e-6 } else { 0.0 };
+        };
+        let spikes = faults_of(spikes);
+        let codes: Vec<_> = spikes
+            .findings
+            .iter()
+            .map(|f| (f.code(), f.channels[0]))
+            .collect();
+        assert_eq!(
+            codes,
+            [
+                (Code::Outliers, Channel::HallA),
+                (Code::Outliers, Channel::BeamX)
+            ]
+        );
+        assert_eq!(spikes.findings[1].cost, None, "service has no beams");
+        // The variance of 400 codes in one of 101 rows is 25 times the noise.
+        assert!((ratio(&spikes)[1] > 1.0), "{:?}", ratio(&spikes));
+        let cost = spikes.findings[0].cost.expect("a cost");
+        assert!(cost > 2.5 && cost < 26f64.sqrt(), "{cost}");
+        let hum = |k: usize, row: &mut Row| {
+            let sine = libm::sin(std::f64::consts::TAU * 0.0746 * k as f64);
+            row.frame
+                .codes
+                .hall
+                .iter_mut()
+                .for_each(|code| *code += (16.0 * sine) as i32);
+        };
+        let hum = faults_of(hum);
+        assert!(
+            hum.findings.iter().all(|found| found.code() == Code::Hum),
+            "{hum:#?}",
+            hum = hum.findings
+        );
+        // In phase it adds up.
+        let alone = hum
+            .findings
+            .iter()
+            .filter_map(|found| found.cost)
+            .fold(0.0, f64::max);
+        let floor = (hum.stays[0].sqrt() + hum.stays[1].sqrt()) * 1e6;
+        assert!(alone > 1.2 && floor > 0.5, "{alone} {floor}");
     }
 }

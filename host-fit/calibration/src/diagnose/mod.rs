@@ -2,7 +2,7 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`signals`] | faults in the signals: missing rows, channels that stand still, outliers, hum |
+//! | [`signals`] | faults in the signals: missing rows, channels that stand still |
 //! | `columns` | faults of single channels, found without a fit, with their cost in service |
 //! | [`faults`] | faults of channels by score tests, with their cost and their repair |
 //! | `mistakes` | mistakes with order, signs, scales and places |
@@ -107,9 +107,9 @@ pub fn diagnose_log(
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
-    let own = Described::from_fit(fitted, stage);
-    let better = fitted.ok();
-    let better = better.and_then(|fit| Described::better(fit, dataset, stage));
+    let designed = || FieldParameters::from_model_31(&Parameters::designed(stage), stage);
+    let own = fitted.map_or_else(|_| designed(), |fit| fit.estimate.parameters);
+    let better = fitted.ok().and_then(|fit| better(fit, dataset, stage));
     let (best, poor) = better.map_or((own, None), |(best, poor)| (best, Some(poor)));
     let mut out = Diagnosis {
         columns: columns(logged, stage),
@@ -117,8 +117,8 @@ pub fn diagnose_log(
     };
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
     let by = Calibrated {
-        parameters: &own.parameters,
-        start: &best.parameters,
+        parameters: &own,
+        start: &best,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         floor_m: probe_noise_m(&out.columns),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
@@ -130,13 +130,7 @@ pub fn diagnose_log(
         Ok(_) => true,
         Err(error) => matches!(error, FitError::Failed(FitFailure::NotDescribed { .. })),
     };
-    let probe_lags_s = out.add_faults(
-        dataset,
-        &without_outliers,
-        stage,
-        (by, best.lag_s),
-        is_described,
-    );
+    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, is_described);
     out.findings.extend(poor);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
@@ -144,14 +138,17 @@ pub fn diagnose_log(
     }
     let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
-    let columns = ColumnFaults::new(&out.columns, logged, stage, &best.parameters);
-    out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.added));
+    let columns = ColumnFaults::new(&out.columns, logged, stage, &best);
+    out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.bent));
     out.findings.extend(columns.findings);
     let is_for_service = by.is_for_service;
     let basis = match fitted {
         Ok(_) => Basis::Fit { is_for_service },
         Err(_) => Basis::NoFit,
     };
+    let at_rest = out
+        .predicted
+        .map(|predicted| predicted.with_added(columns.stays));
     out.motion = fitted.ok().and_then(|fit| {
         let (mut motion, parameters) = (fit.estimate.motion, &fit.estimate.parameters);
         if let Some(repair) = &out.repair {
@@ -163,12 +160,12 @@ pub fn diagnose_log(
         if let Some(lags_s) = probe_lags_s {
             motion = motion.with_other_lags(lags_s);
         }
-        InMotion::new(&motion, parameters, stage, out.predicted.as_ref()?)
+        InMotion::new(&motion, parameters, stage, &at_rest?)
     });
-    let mut stays = [0.0; 3];
-    if let (Some(motion), Some(at_rest)) = (out.motion, out.predicted) {
+    let mut stays = columns.stays;
+    if let (Some(motion), Some(at_rest)) = (out.motion, at_rest) {
         out.findings.extend(motion.finding(&at_rest));
-        stays = motion.added;
+        (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
     }
     out.conclude(stays, basis);
     out.validity = field.and_then(|_| {
@@ -186,47 +183,18 @@ pub fn diagnose_log(
     out
 }
 
-/// Parameters and lag that predict the signals of a log.
-#[derive(Clone, Copy, Debug)]
-struct Described {
-    parameters: FieldParameters,
-    /// The lag of the reference, s.
-    lag_s: f64,
-}
-
-impl Described {
-    /// The parameters of a fit, or of the drawing where there is no fit.
-    fn from_fit(fitted: Result<&Fit, &FitError>, stage: &Stage) -> Self {
-        let of_31 = |parameters| FieldParameters::from_model_31(parameters, stage);
-        match fitted {
-            Ok(fit) => Self {
-                parameters: fit.estimate.parameters,
-                lag_s: match (&fit.later, fit.estimate.lag) {
-                    (None, Some(lag)) => lag.value_s,
-                    // It is taken off the rows.
-                    _ => 0.0,
-                },
-            },
-            Err(_) => Self {
-                parameters: of_31(&Parameters::designed(stage)),
-                lag_s: 0.0,
-            },
-        }
+/// The parameters that describe the log best by the same model where this fit is poor, because a search has not converged,
+/// and a finding about that. Faults are looked for from there.
+fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<(FieldParameters, Finding)> {
+    let over_noise = fit_checks::over_noise(poor, dataset);
+    if poor.field.is_some() || over_noise <= ERROR_TO_NOISE_MAX {
+        return None;
     }
-
-    /// The best description of the log by the same model where this fit is poor, because a search has not converged,
-    /// and a finding about that. Signals are judged by the best description.
-    fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<(Self, Finding)> {
-        let over_noise = fit_checks::over_noise(poor, dataset);
-        if poor.field.is_some() || over_noise <= ERROR_TO_NOISE_MAX {
-            return None;
-        }
-        let model = ModelChoice::Named(poor.model);
-        let best_fit = fit(dataset, stage, &FitSettings::new(model)).ok()?;
-        let best = fit_checks::over_noise(&best_fit, best_fit.rows(dataset));
-        let found = Finding::new(Kind::PoorFit { over_noise, best });
-        (POOR_MIN * best < over_noise).then(|| (Self::from_fit(Ok(&best_fit), stage), found))
-    }
+    let model = ModelChoice::Named(poor.model);
+    let best_fit = fit(dataset, stage, &FitSettings::new(model)).ok()?;
+    let best = fit_checks::over_noise(&best_fit, best_fit.rows(dataset));
+    let found = Finding::new(Kind::PoorFit { over_noise, best });
+    (POOR_MIN * best < over_noise).then_some((best_fit.estimate.parameters, found))
 }
 
 /// Whether the rows of a finding are left out of a repair.
@@ -242,11 +210,10 @@ impl Diagnosis {
         dataset: &Dataset,
         without_outliers: &Dataset,
         stage: &Stage,
-        (by, lag_s): (Calibrated, f64),
+        by: Calibrated,
         is_described: bool,
     ) -> Option<[f64; 3]> {
-        let (findings, bad) =
-            signals::signal_findings(dataset, stage, &self.columns, (by.start, lag_s));
+        let (findings, bad) = signals::signal_findings(dataset, stage, &self.columns);
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
@@ -308,7 +275,7 @@ impl Diagnosis {
         }
     }
 
-    /// Findings and verdict, with variances that sensors add in service because they stay late.
+    /// Findings and verdict, with variances that sensors add in service because they stay late or disturbed.
     fn conclude(&mut self, stays: [f64; 3], basis: Basis) {
         let findings = std::mem::take(&mut self.findings);
         let predicted = self.predicted.as_ref();
@@ -363,7 +330,7 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    out.add_faults(dataset, dataset, stage, (by, 0.0), true);
+    out.add_faults(dataset, dataset, stage, by, true);
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     out.findings
@@ -380,6 +347,8 @@ pub fn diagnose_blob(
             Basis::Blob { is_for_service }
         }
     };
-    out.conclude([0.0; 3], basis);
+    let columns = ColumnFaults::new(&out.columns, dataset, stage, parameters);
+    out.findings.extend(columns.findings);
+    out.conclude(columns.stays, basis);
     out
 }

@@ -23,7 +23,6 @@ mod judgement;
 pub mod left_out;
 pub mod precision;
 pub mod predicted;
-pub mod spectrum;
 pub mod statistics;
 pub mod verdict;
 

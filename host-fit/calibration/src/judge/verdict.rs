@@ -53,8 +53,8 @@ pub enum Basis {
 }
 
 /// Findings without the consequences of others, the most severe first, and the verdict; it is `None` for a blob
-/// where the log cannot predict its errors. Sensors that stay late add the variances `stays` to `predicted`: the
-/// calibration is not at fault, so they do not refuse it.
+/// where the log cannot predict its errors. Sensors that stay late or disturbed add the variances `stays` to `predicted`:
+/// the calibration is not at fault, so they do not refuse it.
 pub fn conclude(
     mut findings: Vec<Finding>,
     predicted: Option<&Predicted>,
@@ -88,6 +88,9 @@ pub fn conclude(
                     Some(open.with_severity(severity(ratio)))
                 } else if ratio > LIMITED_MAX && !is_refused(&ranked) {
                     Some(Finding::new(Kind::FaultsTogether { ratio }))
+                } else if let Some(ratio) = in_service.filter(|of| *of > GOOD_MAX && are_notes) {
+                    let together = Finding::new(Kind::FaultsTogether { ratio });
+                    Some(together.with_severity(Severity::Warn))
                 } else {
                     None
                 };

@@ -52,9 +52,9 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::OutlierRows { rows, largest_um } => {
             let rows = format!("{rows} {}", if *rows == 1 { "row is" } else { "rows are" });
-            format!("{rows} far outside the noise of {on}, by up to {largest_um:.1} µm. The default --loss cauchy gives them no weight")
+            format!("{rows} far outside the noise of {on}, by up to {largest_um:.1} µm. The default --loss cauchy gives them no weight{}", cost(found))
         }
-        Kind::Hum { frequency_hz, amplitude_um } => format!("{on} hums at {frequency_hz:.1} Hz with an amplitude of {amplitude_um:.2} µm"),
+        Kind::Hum { frequency_hz, amplitude_um } => format!("{on} hums at {frequency_hz:.1} Hz with an amplitude of {amplitude_um:.2} µm{}", cost(found)),
         Kind::CoarseSteps { step_um, noise_um } => format!("{on} is written in steps of {step_um:.2} µm, and a Hall probe has {noise_um:.2} µm of noise{}", cost(found)),
         Kind::StuckBits { bits, step_um } => {
             let numbers: Vec<String> = bits.iter().map(u32::to_string).collect();
@@ -62,6 +62,8 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("{which} {} of {on} never {change}, so the values have gaps of up to {step_um:.2} µm{}", listed(&numbers), cost(found))
         }
         Kind::Noisy { noise_um, ratio } => format!("the noise of {on} is {noise_um:.2} µm, {ratio:.1} times the noise of the others{}", cost(found)),
+        Kind::GroupNoise { percent: 0.0 } => format!("the noise of {on} is not even: it has lines, or times with more{}", cost(found)),
+        Kind::GroupNoise { percent } => format!("{percent:.0} % of the noise of {on} is the same in all of them{}", cost(found)),
         Kind::SlowRate { rows, is_held, error_um } => {
             let between = if *is_held { "hold the last one" } else { "are interpolated" };
             format!("{on} has a new value in one of {rows} rows, and the rows between {between}. This takes about {error_um:.2} µm rms off the motion{}", cost(found))

@@ -64,6 +64,7 @@ pub fn remedy(found: &Finding) -> String {
         Kind::InMotion { shows_acceleration: false, .. } => "record the run of host-fit plan, whose second tone shows it, or evaluate on your fastest motion",
         Kind::Resets { .. } => "log resets as movements",
         Kind::SingleRows { .. } => "check the movement column",
+        Kind::GroupNoise { .. } => "check what the channels share: supply, ground, converter, and magnetic fields nearby",
         Kind::RowsMissing { .. } => "look for frames that the recorder lost",
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",
         Kind::Stands { percent: 100.0, .. } => "is it connected?",

@@ -6,25 +6,27 @@ use crate::stage::Stage;
 use std::ops::Range;
 
 /// One channel of one log.
-pub(super) struct Signal<'a> {
-    pub(super) channel: Channel,
+#[derive(Clone, Debug)]
+pub struct Signal<'a> {
+    /// The channel.
+    pub channel: Channel,
     /// The values by row: codes, and picometres for beams.
-    pub(super) values: Vec<f64>,
+    pub values: Vec<f64>,
     /// The unit of the values, m.
-    pub(super) unit_m: f64,
+    pub unit_m: f64,
     /// Runs of consecutive rows of one movement.
-    pub(super) runs: &'a [Range<usize>],
+    pub runs: &'a [Range<usize>],
 }
 
 impl Signal<'_> {
     /// The values of each run.
-    pub(super) fn runs(&self) -> impl Iterator<Item = &[f64]> {
+    pub fn runs(&self) -> impl Iterator<Item = &[f64]> {
         self.runs.iter().map(|run| &self.values[run.clone()])
     }
 }
 
 /// The runs of consecutive rows of one movement. Rows are numbered from the first of the log.
-pub(super) fn runs(dataset: &Dataset, log: &LogSource) -> Vec<Range<usize>> {
+pub fn runs(dataset: &Dataset, log: &LogSource) -> Vec<Range<usize>> {
     let rows = &dataset.rows[log.rows.clone()];
     let gap_us = GAP_PERIODS * 1e6 * dataset.period_s(log.rows.clone()).unwrap_or(f64::INFINITY);
     let follows =
@@ -38,7 +40,7 @@ pub(super) fn runs(dataset: &Dataset, log: &LogSource) -> Vec<Range<usize>> {
 }
 
 /// The channels of a log: beams only if it has a reference, gaps only if it has codes.
-pub(super) fn signals<'a>(
+pub fn signals<'a>(
     dataset: &Dataset,
     stage: &Stage,
     log: &LogSource,

@@ -38,6 +38,17 @@ fn with_hall_a(change: impl Fn(usize, i32) -> i32) -> Column {
     column(&dataset, Channel::HallA)
 }
 
+/// Even noise of variance one.
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 1u64;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        12f64.sqrt() * ((state >> 33) as f64 / 2f64.powi(31) - 0.5)
+    }
+}
+
 #[test]
 fn a_sound_log_has_the_noise_of_its_sensors_and_no_fault() {
     let stage = stage();
@@ -186,14 +197,9 @@ fn a_line_that_fills_a_gap_is_a_straight_run_and_a_level_one_is_not() {
 #[test]
 fn noise_is_compared_with_siblings_and_over_time() {
     let noisy = |from: usize| {
-        with_hall_a(move |k, code| {
-            let random = (k as i32).wrapping_mul(1_103_515_245).wrapping_add(12_345) >> 8;
-            if k < from {
-                code
-            } else {
-                code + random.rem_euclid(101) - 50
-            }
-        })
+        let mut random = noise();
+        let added: Vec<i32> = (0..15_000).map(|_| (30.0 * random()) as i32).collect();
+        with_hall_a(move |k, code| code + if k < from { 0 } else { added[k] })
     };
     let ratio = noisy(0).to_siblings.expect("three");
     assert!((3.0..5.5).contains(&ratio), "{ratio}");
@@ -257,21 +263,103 @@ fn fast_motion_of_the_stage_is_no_filter() {
 
 #[test]
 fn the_floor_has_no_coarse_steps_and_a_noisy_probe_counts_as_the_middle_one() {
-    let floor = |change: fn(i32, usize) -> i32| {
-        let mut dataset = sound();
-        for (k, row) in dataset.rows.iter_mut().enumerate() {
-            row.frame.codes.hall[1] = change(row.frame.codes.hall[1], k);
+    let floor = |change: &dyn Fn(i32, f64) -> i32| {
+        let (mut dataset, mut random) = (sound(), noise());
+        for row in &mut dataset.rows {
+            row.frame.codes.hall[1] = change(row.frame.codes.hall[1], random());
         }
         let noise_m = probe_noise_m(&columns(&dataset, &stage())).expect("runs of six rows");
         noise_m.map(|m| m / stage().hall.m_per_count)
     };
-    let own = floor(|code, _| code);
+    let own = floor(&|code, _| code);
     assert!(
         own.iter().all(|codes| (7.5..8.5).contains(codes)),
         "{own:?}"
     );
-    let coarse = floor(|code, _| code - code.rem_euclid(20));
+    let coarse = floor(&|code, _| code - code.rem_euclid(20));
     assert!((coarse[1] / own[1] - 1.0).abs() < 0.1, "{coarse:?}");
-    let noisy = floor(|code, k| code + [60, -60][k % 2]);
+    let noisy = floor(&|code, random| code + (60.0 * random) as i32);
     assert!(own.contains(&noisy[1]), "{noisy:?}");
+}
+
+#[test]
+fn noise_that_all_probes_share_is_no_part_of_the_floor() {
+    let floor = |codes: f64| {
+        let mut dataset = sound();
+        let mut random = noise();
+        for row in &mut dataset.rows {
+            let own = (codes * random()).round() as i32;
+            row.frame
+                .codes
+                .hall
+                .iter_mut()
+                .for_each(|code| *code += own);
+        }
+        let columns = columns(&dataset, &stage());
+        let floor_m = probe_noise_m(&columns).expect("rows");
+        let beyond_m2 = columns[0].beyond_m2;
+        let unit_m = stage().hall.m_per_count;
+        (
+            floor_m.map(|m| m / unit_m),
+            beyond_m2.map(|m2| m2 / unit_m / unit_m),
+        )
+    };
+    let (own, none) = floor(0.0);
+    assert_eq!(none, [0.0; 3]);
+    let (floor, beyond) = floor(32.0);
+    for k in 0..3 {
+        assert!((floor[k] / own[k] - 1.0).abs() < 0.1, "{floor:?}");
+        assert!((beyond[k] / 1024.0 - 1.0).abs() < 0.1, "{beyond:?}");
+    }
+}
+
+#[test]
+fn lines_and_outliers_are_named_with_their_size_and_their_variance() {
+    let unit_m = stage().hall.m_per_count;
+    let sine = |k: usize| (40.0 * libm::sin(TAU * 37.3 * 0.002 * k as f64)).round() as i32;
+    let hum = with_hall_a(|k, code| code + sine(k));
+    let line = hum.line.expect("a line");
+    assert!((line.frequency_hz - 37.3).abs() < 0.3, "{line:?}");
+    assert!(
+        (line.amplitude_m / unit_m / 40.0 - 1.0).abs() < 0.1,
+        "{line:?}"
+    );
+    let variance = hum.beyond_m2[0] / unit_m / unit_m;
+    assert!((variance / 800.0 - 1.0).abs() < 0.15, "{variance}");
+    let spikes = |size: i32| with_hall_a(move |k, code| code + if k % 101 == 7 { size } else { 0 });
+    let large = spikes(400);
+    assert_eq!(large.outliers.len(), 149);
+    assert_eq!(large.outliers[3].0, 310);
+    for (column, size) in [(large, 400.0), (spikes(-100), 100.0)] {
+        let variance = column.beyond_m2[0] / unit_m / unit_m;
+        assert!(
+            (variance * 101.0 / (size * size) - 1.0).abs() < 0.25,
+            "{variance}"
+        );
+    }
+    let few = with_hall_a(|k, code| code + if k % 5000 == 7 { 4000 } else { 0 });
+    let variance = few.beyond_m2[0] / unit_m / unit_m;
+    assert!(
+        (variance / (16e6 / 5000.0) - 1.0).abs() < 0.05,
+        "{variance}"
+    );
+    let step = with_hall_a(|k, code| if k > 7000 { code + 4000 } else { code });
+    assert_eq!((step.outliers, step.beyond_m2), (Vec::new(), [0.0; 3]));
+}
+
+#[test]
+fn motion_that_beams_and_probes_show_is_no_line() {
+    let mut dataset = sound();
+    for (k, row) in dataset.rows.iter_mut().enumerate() {
+        let error_m = 3e-6 * libm::sin(TAU * 60.0 * 0.002 * k as f64);
+        row.reference[0] += error_m;
+        let codes = (error_m / stage().hall.m_per_count).round() as i32;
+        row.frame.codes.hall[0] += codes;
+    }
+    let columns = columns(&dataset, &stage());
+    assert!(
+        columns.iter().all(|column| column.line.is_none()),
+        "{columns:#?}"
+    );
+    assert_eq!(columns[0].beyond_m2, [0.0; 3]);
 }

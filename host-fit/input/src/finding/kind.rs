@@ -154,18 +154,20 @@ kinds! {
     IdleMovements { movements: usize, of: usize } => Code::IdleMovement;
     /// A channel repeats a value, which may be its largest or its smallest, or shows its noise alone, while it should move.
     Stands { rows: usize, percent: f64, longest_s: f64, is_end: bool } => if *is_end { Code::Saturated } else { Code::Stuck }, if *is_end { *rows as f64 } else { *longest_s }, if *is_end { "rows" } else { "s" };
+
+    // Of each channel alone.
     /// Rows of a channel far from the rows before and behind.
     OutlierRows { rows: usize, largest_um: f64 } => Code::Outliers, *rows as f64, "rows";
     /// A line in the spectrum of a channel.
     Hum { frequency_hz: f64, amplitude_um: f64 } => Code::Hum, *frequency_hz, "Hz";
-
-    // Of each channel alone.
     /// The values are whole steps.
     CoarseSteps { step_um: f64, noise_um: f64 } => Code::Coarse, *step_um, "um";
     /// Bits of a code that never change.
     StuckBits { bits: Vec<u32>, step_um: f64 } => Code::StuckBit, *step_um, "um";
     /// The noise over the noise of the other channels of the kind.
     Noisy { noise_um: f64, ratio: f64 } => Code::Noisy, *ratio, "times";
+    /// Noise of a kind of channels beyond the noise that each has of its own all the time; the part that all have at once.
+    GroupNoise { percent: f64 } => Code::Noisy, *percent, "%";
     /// New values come every few rows, and values between them are held or interpolated; the lost motion.
     SlowRate { rows: usize, is_held: bool, error_um: f64 } => Code::Slow, *rows as f64, "rows";
     /// The noise falls towards high frequencies by more than a sensor's does.

@@ -1,7 +1,7 @@
 //! The signals of one log, channel by channel.
 
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::Column;
+use hallstage_input::channels::{self, Column, runs, signals};
 use hallstage_input::dataset::{Dataset, LogSource, Row};
 use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
@@ -17,10 +17,12 @@ pub(super) struct LogSignals<'a> {
     /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
     /// The values by channel and row, m, in the order of
-    /// [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE); gaps only if the log has codes.
-    pub(super) channels: Vec<Vec<f64>>,
-    /// The step of the values of each channel, m.
-    pub(super) steps_m: [f64; 9],
+    /// [`Channel::SINGLE`](hallstage_input::channel::Channel::SINGLE); empty where the log does not have the channel.
+    pub(super) channels: [Vec<f64>; 9],
+    /// Rows that are outliers of a channel.
+    pub(super) outliers: Vec<usize>,
+    /// Their properties, where the log has the channel.
+    pub(super) columns: [Option<&'a Column>; 9],
     /// Whether later tests use a row.
     pub(super) usable: Vec<bool>,
     /// Median time between rows, s.
@@ -32,7 +34,7 @@ impl<'a> LogSignals<'a> {
         dataset: &'a Dataset,
         stage: &'a Stage,
         log: usize,
-        columns: &[Column],
+        columns: &'a [Column],
     ) -> Self {
         let source = &dataset.logs[log];
         let (start, rows) = (source.rows.start, &dataset.rows[source.rows.clone()]);
@@ -40,15 +42,24 @@ impl<'a> LogSignals<'a> {
         let segments: Vec<Range<usize>> = movements
             .map(|m| m.rows.start - start..m.rows.end - start)
             .collect();
+        let columns = Channel::SINGLE.map(|channel| {
+            let is_own = |column: &&Column| (column.log, column.channel) == (log, channel);
+            columns.iter().find(is_own)
+        });
+        let runs = runs(dataset, source);
+        let (mut channels, mut outliers) = ([const { Vec::new() }; 9], Vec::new());
+        for signal in signals(dataset, stage, source, &runs) {
+            let channel = signal.channel as usize;
+            let values_m = signal.values.iter().map(|value| value * signal.unit_m);
+            channels[channel] = values_m.collect();
+            if columns[channel].is_some_and(|column| column.slow.is_none()) {
+                outliers.extend(channels::outliers(&signal).into_iter().map(|(row, _)| row));
+            }
+        }
         Self {
-            channels: channels(rows, stage),
-            steps_m: Channel::SINGLE.map(|channel| {
-                let is_own = |column: &&Column| (column.log, column.channel) == (log, channel);
-                columns
-                    .iter()
-                    .find(is_own)
-                    .map_or(0.0, |column| column.step_m)
-            }),
+            channels,
+            columns,
+            outliers,
             usable: vec![true; rows.len()],
             period_s: (dataset.period_s(source.rows.clone())).unwrap_or(stage.servo_period_s),
             dataset,
@@ -77,24 +88,6 @@ impl<'a> LogSignals<'a> {
         let movement = &self.dataset.movements[movement];
         Finding::new(kind).with_place(self.dataset.movement_name(movement), t_us)
     }
-}
-
-fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
-    let mut channels = vec![Vec::new(); 9];
-    for row in rows {
-        // Equal beams differ by rounding after the way to a pose and back.
-        let beams_m = row
-            .beams_m(&stage.interferometer)
-            .map(|beam_m| f64::from(beam_m as f32));
-        let codes = row.frame.capacitive().into_iter().flatten();
-        let gaps_m = codes.map(|code| f64::from(code) * stage.capacitive.m_per_count);
-        let values = row.signal_m.into_iter().chain(beams_m).chain(gaps_m);
-        for (channel, value) in channels.iter_mut().zip(values) {
-            channel.push(value);
-        }
-    }
-    channels.retain(|values| values.len() == rows.len());
-    channels
 }
 
 /// The median; 0 if there are no values.

@@ -1,8 +1,6 @@
 //! A small simulated log for the tests of faults.
 
 use super::signal_findings;
-use crate::diagnose::Described;
-use crate::fit::{FitSettings, ModelChoice, fit};
 use hallstage_input::channel::Channel;
 use hallstage_input::channels::columns;
 use hallstage_input::dataset::Dataset;
@@ -34,11 +32,6 @@ pub(super) fn with_rests(count: usize) -> Recording {
     run.movements.extend(std::iter::repeat_n(rest, count));
     let assembly = Assembly::draw(&stage, 3);
     record(&stage, &assembly, run, &SensorErrors::USUAL, 3).expect("clear")
-}
-
-/// Codes of a Hall channel.
-pub(super) fn codes(error_m: f64) -> i32 {
-    (error_m / stage().hall.m_per_count).round() as i32
 }
 
 /// The recording with one of the nine channels held at the value of the first row, over some rows of a movement, with
@@ -75,15 +68,7 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
 }
 
 pub(super) fn found(dataset: &Dataset) -> Vec<Finding> {
-    let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
-    let by = Described::from_fit(fitted.as_ref(), &stage());
-    signal_findings(
-        dataset,
-        &stage(),
-        &columns(dataset, &stage()),
-        (&by.parameters, by.lag_s),
-    )
-    .0
+    signal_findings(dataset, &stage(), &columns(dataset, &stage())).0
 }
 
 /// The warnings about a log.

@@ -1,4 +1,4 @@
-//! Movements without motion, and channels that repeat one value.
+//! Movements without motion, channels that repeat one value, and channels that show their noise alone.
 
 use super::BLOCK;
 use super::channels::{LogSignals, levels};
@@ -10,6 +10,8 @@ use std::ops::Range;
 
 /// Motion below this is none, m: it is a few times the drift of the interferometers in a movement.
 const STILL_M: f64 = 2e-6;
+/// Rows beside a run that are left out, too.
+const BESIDE: usize = 2;
 
 /// Movements without motion. Their rows are left out. A log where nothing moves at all proves nothing and is refused.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
@@ -48,7 +50,7 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
         let second = threes.map(|v| (v[0] - 2.0 * v[1]) + v[2]);
         let squares: f64 = second.map(|x| x * x).sum();
         let white_m = (squares / (6.0 * values.len() as f64)).sqrt();
-        let code_m = log.steps_m[channel];
+        let code_m = log.columns[channel].map_or(0.0, |column| column.step_m);
         // The chance of the most likely code, and the length of a run that is as rare as a clear deviation.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
         let least = match spread(values) {
@@ -65,7 +67,24 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
             .collect()
     };
     let runs = log.channels.iter().enumerate().map(runs).collect();
-    named(log, runs, 2)
+    named(log, runs)
+}
+
+/// A channel that shows its noise alone in a log in which all others move.
+pub(super) fn noise_alone(log: &mut LogSignals) -> Vec<Finding> {
+    let moves = |channel: usize| {
+        let noise_m = log.columns[channel].and_then(|column| column.white_noise_m);
+        let still_m = STILL_M.max(CLEAR * noise_m.unwrap_or(0.0));
+        let moved_m = |rows: &Range<usize>| motion_m(log, channel..channel + 1, rows);
+        log.columns[channel].is_some() && log.segments.iter().any(|rows| moved_m(rows) > still_m)
+    };
+    let still: Vec<usize> = (0..9).filter(|&channel| !moves(channel)).collect();
+    let all = |channel: usize| match still == [channel] {
+        true => vec![0..log.rows.len()],
+        false => Vec::new(),
+    };
+    let runs = (0..9).map(all).collect();
+    named(log, runs)
 }
 
 /// Whether a channel should change in these rows. A probe always has noise of many codes. A beam moves where a probe
@@ -86,12 +105,8 @@ fn motion_m(log: &LogSignals, channels: Range<usize>, rows: &Range<usize>) -> f6
 }
 
 /// Findings for channels that stand still in runs of rows, at the longest run: as saturated where its value is the
-/// largest or the smallest of the channel. The rows and `beside` rows on either side are left out.
-pub(super) fn named(
-    log: &mut LogSignals,
-    runs: Vec<Vec<Range<usize>>>,
-    beside: usize,
-) -> Vec<Finding> {
+/// largest or the smallest of the channel. The rows and those beside are left out.
+fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
     let finding = |(channel, runs): (usize, &Vec<Range<usize>>)| {
         let longest = runs.iter().max_by_key(|run| run.len())?;
         let rows = runs.iter().map(Range::len).sum::<usize>();
@@ -114,7 +129,7 @@ pub(super) fn named(
         Some(found.with_severity(severity_of_share(share).max(Severity::Warn)))
     };
     let findings = runs.iter().enumerate().filter_map(finding).collect();
-    log.leave_out(runs.into_iter().flatten(), beside);
+    log.leave_out(runs.into_iter().flatten(), BESIDE);
     findings
 }
 
@@ -142,6 +157,17 @@ mod tests {
                     (Some("1"), Some(1_000_000))
                 );
             }
+        }
+    }
+
+    #[test]
+    fn a_channel_that_shows_its_noise_alone_is_stuck() {
+        for (channel, name) in [(2, Channel::HallC), (3, Channel::BeamX), (7, Channel::Gap2)] {
+            let still = (0..3).fold(recording(), |recording, movement| {
+                held(&recording, channel, movement, 0..ROWS, 1.0)
+            });
+            let found = only(&still, Code::Stuck, Some(name));
+            assert_eq!(found.severity, Severity::Refuse);
         }
     }
 
