@@ -14,7 +14,7 @@
 use crate::report::figure::{Group, Item, bare, group, micro};
 use crate::report::parameters::{motion_parameters_in, parameters_in, temperature_parameters_in};
 use crate::report::table::Table;
-use hallstage_input::axis::{AXES, Axis};
+use hallstage_input::axis::{AXES, Axis, sign};
 use hallstage_solver::estimator::terms::names;
 use nalgebra::{Matrix3, Vector3};
 use runtime::matrix::from_rows;
@@ -129,6 +129,24 @@ pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
     })
 }
 
+/// The answer in one line, from what [`pose_difference`] found.
+///
+/// # Errors
+/// The errors of the serializer.
+pub fn answer(difference: &Group) -> Result<String, serde_json::Error> {
+    let found = serde_json::to_value(difference)?;
+    let differs = |axis: &Axis| {
+        let peak = found["axes"][axis.key][format!("peak_{}", axis.micro)].as_f64()?;
+        let text = format!("{peak:.2} {} in {}", sign(axis.micro), axis.name);
+        (peak > 0.0).then_some(text)
+    };
+    let axes: Vec<String> = AXES.iter().filter_map(differs).collect();
+    Ok(match axes.as_slice() {
+        [] => "equal: the same codes give the same poses".to_owned(),
+        axes => format!("differs by up to {} in service", axes.join(", ")),
+    })
+}
+
 /// From poses to codes, by one blob.
 struct Codes {
     decoder: runtime::AnyDecoder,
@@ -184,6 +202,26 @@ impl Codes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_answer_is_equal_or_the_largest_difference_of_each_axis_that_differs() {
+        let [a, _] = sets();
+        let answered = |b: &ParameterSet| {
+            let difference = pose_difference(&a, b).expect("a geometry");
+            answer(&difference).expect("JSON")
+        };
+        let mut b = a.clone();
+        b.serial = "another".try_into().expect("short");
+        assert!(answered(&b).starts_with("equal"));
+        // X is 0.1 % longer.
+        let of_x = &mut b.constants.planar_per_code[0];
+        of_x.iter_mut().for_each(|x| *x *= 1.001);
+        let text = answered(&b);
+        assert!(
+            text.starts_with("differs by up to 0.") && text.ends_with("µm in X in service"),
+            "{text}"
+        );
+    }
 
     const BLOBS: [&[u8]; 2] = [
         include_bytes!("../../runtime/examples/stage.bin"),

@@ -12,7 +12,7 @@ use hallstage_calibration::fit::{FitSettings, ModelChoice};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
-#[command(mut_arg("paths", |paths| paths.required(false).required_unless_present("stage")))]
+#[command(mut_arg("paths", |paths| paths.required(false)))]
 #[command(mut_arg("report", |report| report.requires("paths")))]
 #[command(mut_arg("json", |json| json.requires("paths")))]
 pub(super) struct CheckArgs {

@@ -4,7 +4,7 @@ use super::arguments::Json;
 use super::inspect::errors;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diff::{change_table, parameter_changes, pose_difference};
+use crate::diff::{answer, change_table, parameter_changes, pose_difference};
 use crate::output::{blob_file, posterior_file};
 use crate::report::figure::{Group, group};
 use crate::report::text::as_text;
@@ -36,7 +36,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     let [a, b] = [blob_file::read(paths[0])?, blob_file::read(paths[1])?];
     let errors = [standard_errors(&a, paths[0]), standard_errors(&b, paths[1])];
     let difference = pose_difference(&a, &b);
-    let is_compared = difference.is_some();
+    let answer = difference.as_ref().map(answer).transpose()?;
     let changes = parameter_changes([&a, &b], [&errors[0], &errors[1]]);
     let figures = group! {
         "a" => blob(paths[0], &a),
@@ -46,6 +46,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
         "pose_difference" => difference,
     };
     args.json.write(&figures)?;
+    if let Some(answer) = &answer {
+        terminal::print(&format!("{answer}\n"))?;
+    }
     let tables = [figures.tables(), vec![change_table(&changes)]].concat();
     terminal::print(&as_text(&tables))?;
     if a.serial != b.serial {
@@ -55,7 +58,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
         });
         terminal::warn(&[format!("the blobs have other serial numbers: {a} and {b}")]);
     }
-    if !is_compared {
+    if answer.is_none() {
         terminal::warn(&[
             "the poses cannot be compared: the geometry of the first blob has no inverse"
                 .to_owned(),

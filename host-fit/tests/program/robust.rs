@@ -96,6 +96,7 @@ fn diff_tells_a_change_in_units_in_sigma_and_as_a_pose() {
     let output = bench.good("diff clean.bin 31.bin --json other.json");
     assert!(stderr(&output).contains("serial"));
     assert!(stdout(&output).contains("15625"));
+    assert!(stdout(&output).starts_with("differs by up to "));
     let other = bench.json("other.json");
     let eta = &other["parameters"]["eta_a"];
     let of = |key: &str| number(&eta[key]);
