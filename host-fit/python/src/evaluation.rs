@@ -100,7 +100,7 @@ impl Evaluation {
         self.evaluated.refusal_message()
     }
 
-    /// The same as a name that stays: "other_log"; None if it does.
+    /// The same as a name that stays: "other_log", "beyond_limit" or "findings"; None if it does.
     #[getter]
     fn refusal_code(&self) -> Option<&'static str> {
         self.evaluated.refusal.as_ref().map(Refusal::code)

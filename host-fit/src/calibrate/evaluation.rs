@@ -4,16 +4,17 @@ use crate::report::errors::{RowErrors, errors};
 use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
-use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob};
-use hallstage_calibration::fit::counted;
+use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob, diagnose_log};
+use hallstage_calibration::fit::{FitSettings, ModelChoice, counted, fit};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
-use hallstage_calibration::judge::verdict::Verdict;
+use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
 use hallstage_input::axis::{Axis, PLANAR};
-use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -96,22 +97,23 @@ impl Evaluation {
         let by_row = decoded.errors_less(&sampled.zeros, &log.dataset);
         let is_refitted = zeros == Zeros::Refit;
         let blob_use = BlobUse::Evaluated { is_refitted };
-        let mut diagnosis = diagnose_blob(&log.dataset, stage, set, blob_use);
+        // As the blob's own errors were counted, whatever zeros are asked for.
+        let comparable = judge.judgement(own_zeros).errors;
+        let usual = if is_field(set) { 3.0 } else { 10.0 };
+        let limit = order.limit.unwrap_or(usual);
+        let other = other_log(set, &comparable, limit);
+        let mut diagnosis = match &other {
+            Some(_) => faults_of(&log.dataset, stage),
+            None => diagnose_blob(&log.dataset, stage, set, blob_use),
+        };
         diagnosis.validity = known.and_then(|known| {
             let parameters = FieldParameters::from_set(set, stage)?;
             let (white_m, covariance) = (known.noise.white_m, &known.covariance);
             Validity::new(stage, &parameters, white_m, covariance)
         });
-        // As the blob's own errors were counted, whatever zeros are asked for.
-        let comparable = judge.judgement(own_zeros).errors;
-        let usual = if is_field(set) { 3.0 } else { 10.0 };
-        let limit = order.limit.unwrap_or(usual);
-        let is_still = |found: &Finding| {
-            found.code() == Code::IdleMovement && found.severity == Severity::Refuse
-        };
-        let still = diagnosis.findings.iter().any(is_still);
-        let refusal = other_log(set, &comparable, limit);
-        let refusal = refusal.or_else(|| still.then_some(Refusal::Findings));
+        let refusal = other
+            .or_else(|| Refusal::from_findings(&diagnosis.findings))
+            .or_else(|| beyond_limit(&diagnosis));
         if refusal.is_some() {
             diagnosis.verdict = Some(Verdict::Refused);
         }
@@ -132,8 +134,15 @@ impl Evaluation {
 
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
-        let counts = counted(&self.judgement.zeros, self.judgement.undecoded);
         let mut warnings = words::messages(&self.log.warnings);
+        if self.set.logs_sha256 == self.log.dataset.sha256 {
+            warnings.push(words::OWN_LOG.to_owned());
+        }
+        let zeros = match self.refusal {
+            Some(Refusal::OtherLog { .. }) => &[][..],
+            _ => &self.judgement.zeros,
+        };
+        let counts = counted(zeros, self.judgement.undecoded);
         warnings.extend(counts.map(|found| words::message(&found)));
         let mut report = Report::from_judgement(Judged {
             set: &self.set,
@@ -157,15 +166,20 @@ impl Evaluation {
     /// How it ended, for reports.
     pub fn subject(&self) -> Subject<'_> {
         let own = self.set.fit.rms.map(f64::from);
-        let end = self.refusal.as_ref();
+        let end = match &self.refusal {
+            None | Some(Refusal::BeyondLimit { .. }) => End::Judged,
+            Some(refusal) => End::Failed(refusal),
+        };
+        let in_service = is_field(&self.set) && self.diagnosis.predicted.is_some();
+        let on_log = own.map(|rms| (rms > 0.0).then_some(self.limit * rms));
         Subject {
-            end: end.map_or(End::Judged, End::Failed),
+            end,
             diagnosis: &self.diagnosis,
             is_field: is_field(&self.set),
             errors: Some(&self.judgement.errors),
-            limits: own.map(|rms| (rms > 0.0).then_some(self.limit * rms)),
+            limits: if in_service { [None; 3] } else { on_log },
             corrected: self.corrected.as_ref(),
-            in_service: false,
+            in_service,
         }
     }
 
@@ -174,6 +188,43 @@ impl Evaluation {
         let refusal = self.refusal.as_ref()?;
         Some(words::refusal(refusal, &self.diagnosis.findings))
     }
+}
+
+/// What is wrong with a log, by a fit to the log itself: the residuals of a blob that does not describe it say nothing of
+/// its channels.
+fn faults_of(dataset: &Dataset, stage: &Stage) -> Diagnosis {
+    let own = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
+    let Diagnosis {
+        mut findings,
+        columns,
+        ..
+    } = diagnose_log(dataset, stage, own.as_ref());
+    let is_fault = |found: &Finding| found.severity == Severity::Refuse || found.is_repaired;
+    findings.retain(|found| is_fault(found) && found.code().entry().explains_from.is_some());
+    findings
+        .iter_mut()
+        .for_each(|found| found.is_repaired = false);
+    Diagnosis {
+        findings,
+        columns,
+        ..Diagnosis::default()
+    }
+}
+
+/// The refusal of a blob with errors in service that no finding explains.
+fn beyond_limit(diagnosis: &Diagnosis) -> Option<Refusal> {
+    let predicted = diagnosis.predicted.as_ref()?;
+    let beyond = |(k, axis): (usize, &'static Axis)| Beyond {
+        axis,
+        rms: predicted.rms[k],
+        limit: LIMITED_MAX * predicted.noise(k),
+    };
+    let errors = PLANAR.iter().enumerate().map(beyond);
+    let errors = errors.filter(|error| error.rms > error.limit).collect();
+    (diagnosis.verdict == Some(Verdict::Refused)).then_some(Refusal::BeyondLimit {
+        errors,
+        is_in_service: true,
+    })
 }
 
 fn is_field(set: &ParameterSet) -> bool {

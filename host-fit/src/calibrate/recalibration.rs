@@ -67,7 +67,7 @@ impl Updated {
             errors: Some(&self.new.judgement.errors),
             limits: [None; 3],
             corrected: None,
-            in_service: false,
+            in_service: true,
         }
     }
 }

@@ -43,7 +43,8 @@ pub struct Subject<'a> {
     pub corrected: Option<&'a PoseError>,
     /// Largest rms errors of X, Y, Rz: m, m, rad.
     pub limits: [Option<f64>; 3],
-    /// Whether these hold for the errors in service, in place of those on the log.
+    /// Whether these hold for the errors in service, in place of those on the log. In service a field model has a limit of
+    /// its own: the smaller one counts.
     pub in_service: bool,
 }
 
@@ -75,7 +76,6 @@ impl Summary {
             (End::Failed(_), _) => ("refused", "Refused"),
             (End::Interrupted, _) => ("limited", "Interrupted, the best so far"),
             (End::Written, Some(Verdict::Refused)) => ("refused", "Written in spite of a refusal"),
-            // The command does not end with an error that says why.
             (End::Judged, Some(Verdict::Refused)) => ("refused", "Not good enough for service"),
             (_, Some(Verdict::Refused)) => ("refused", "Refused"),
             (_, Some(Verdict::Limited)) => ("limited", "Limited"),
@@ -120,8 +120,8 @@ fn sentence(of: &Subject) -> String {
     }
 }
 
-/// By axis: rms over all rows, noise, rms predicted for service, expanded uncertainty, limit. The uncertainty is twice the
-/// rms in service, or on the log if service is not predicted; k = 2 covers 95 % of normal errors.
+/// By axis: rms over all rows, noise, rms predicted for service, the limit of one of these, expanded uncertainty. The
+/// uncertainty is twice the rms in service, or on the log if service is not predicted; k = 2 covers 95 % of normal errors.
 fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
     if of.errors.is_none() && predicted.is_none() {
         return Table::default();
@@ -130,9 +130,12 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         "rms on the log",
         "noise",
         "rms in service",
-        "uncertainty, k = 2",
-        "limit",
+        match of.in_service {
+            true => "limit in service",
+            false => "limit on the log",
+        },
         "pass",
+        "uncertainty, k = 2",
     ];
     if of.corrected.is_some() {
         columns.insert(1, "corrected for motion");
@@ -148,22 +151,22 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         let own = noise
             .filter(|_| of.is_field)
             .map(|noise| LIMITED_MAX * noise);
-        // What follows from the noise holds in service.
-        let (limit, measured) = match of.limits[k] {
-            Some(limit) if !of.in_service => (Some(limit), rms),
-            limit => (limit.or(own), service),
+        let (limit, measured) = match of.in_service {
+            true => (
+                of.limits[k].into_iter().chain(own).reduce(f64::min),
+                service,
+            ),
+            false => (of.limits[k], rms),
         };
         let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
         let uncertainty = service.or(rms).map(|rms| 2.0 * rms);
-        let errors = [rms, noise, service, uncertainty, limit];
-        let mut errors = errors.to_vec();
+        let error = |error: Option<f64>| error.map_or(Figure::None, |error| micro(axis, error));
+        let mut figures = [rms, noise, service, limit].map(error).to_vec();
+        figures.extend([passes.map_or(Figure::None, Figure::Is), error(uncertainty)]);
         if let Some(corrected) = of.corrected {
-            errors.insert(1, Some(corrected.axes[k].rms));
+            figures.insert(1, micro(axis, corrected.axes[k].rms));
         }
-        let figures = (errors.into_iter())
-            .map(|error| error.map_or(Figure::None, |error| micro(axis, error)));
-        let pass = passes.map_or(Figure::None, Figure::Is);
-        table.row(axis.name, figures.chain([pass]));
+        table.row(axis.name, figures);
     }
     table
 }
@@ -207,6 +210,10 @@ mod tests {
     };
 
     fn summary(end: End, verdict: Option<Verdict>, is_field: bool) -> Summary {
+        limited(end, verdict, is_field, true)
+    }
+
+    fn limited(end: End, verdict: Option<Verdict>, is_field: bool, in_service: bool) -> Summary {
         let axis = AxisError {
             rms: 1e-6,
             ..AxisError::default()
@@ -233,7 +240,7 @@ mod tests {
             errors: Some(&errors),
             limits: [None, Some(0.9e-6), None],
             corrected: None,
-            in_service: false,
+            in_service,
         })
     }
 
@@ -253,6 +260,12 @@ mod tests {
             (failed, good, true, ["refused", "7.0 times the noise", ""]),
             (End::Interrupted, good, true, ["limited", "1.20", ""]),
             (End::Judged, None, true, ["limited", "1.20 times", ""]),
+            (
+                End::Judged,
+                refused,
+                true,
+                ["refused", "1.20 times", "recalibrate"],
+            ),
         ] {
             let found = summary(end, verdict, is_field);
             assert_eq!(found.mark, mark, "{end:?} {verdict:?}");
@@ -262,22 +275,30 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_holds_on_the_log_and_that_of_the_noise_in_service() {
-        let text = summary(End::Written, Some(Verdict::Good), true).as_text();
-        let row = |axis: &str| {
-            let line = text
-                .lines()
-                .find(|line| line.starts_with(axis))
-                .expect("a row");
-            line.split_whitespace()
-                .skip(1)
-                .collect::<Vec<_>>()
-                .join(" ")
+    fn all_axes_pass_by_one_quantity_that_the_column_of_the_limit_names() {
+        let rows = |in_service: bool| {
+            let text = limited(End::Written, Some(Verdict::Good), true, in_service).as_text();
+            let lines = text.lines().skip(1);
+            let lines = lines.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
+            lines.collect::<Vec<_>>()
         };
-        // rms, noise, in service, k = 2, limit.
-        assert_eq!(row("  X "), "1.00 1.00 1.20 2.40 1.30 yes µm");
-        assert_eq!(row("  Y "), "1.00 0.50 0.50 1.00 0.90 no µm");
-        assert_eq!(row("  Rz"), "1.00 2.40 2.40 4.80 3.12 yes µrad");
-        assert!(text.ends_with("next: judge it on another log with host-fit eval\n"));
+        // rms, noise, in service, limit, k = 2. The smaller limit counts.
+        let [title, x, y, rz, next] = &rows(true)[..] else {
+            panic!("three axes");
+        };
+        assert!(
+            title.contains("limit in service pass uncertainty"),
+            "{title}"
+        );
+        assert_eq!(x, "X 1.00 1.00 1.20 1.30 yes 2.40 µm");
+        assert_eq!(y, "Y 1.00 0.50 0.50 0.65 yes 1.00 µm");
+        assert_eq!(rz, "Rz 1.00 2.40 2.40 3.12 yes 4.80 µrad");
+        assert_eq!(next, "next: judge it on another log with host-fit eval");
+        let [title, x, y, ..] = &rows(false)[..] else {
+            panic!("three axes");
+        };
+        assert!(title.contains("limit on the log pass"), "{title}");
+        assert_eq!(x, "X 1.00 1.00 1.20 - - 2.40 µm");
+        assert_eq!(y, "Y 1.00 0.50 0.50 0.90 no 1.00 µm");
     }
 }

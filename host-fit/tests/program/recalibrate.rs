@@ -103,7 +103,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     assert_eq!(repaired.len(), 1);
     says(repaired[0].to_string(), "The gain of Hall B changes");
     let fit = "fit new.csv --out other.bin --limit y=0.2um";
-    let words = "The errors in service are beyond --limit: y 0.4";
+    let words = "The errors in service are beyond the limit: y 0.4";
     bench.bad(fit, 4, &[words]);
 }
 
@@ -139,4 +139,27 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
     let parts = ["old.bin.posterior does not exist", "--what gains"];
     refused("old.bin log.csv --what all", 3, &parts);
+}
+
+#[test]
+fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit() {
+    let bench = bench();
+    let own = bench.good("eval old.bin log.csv");
+    says(stderr(&own), "the errors here verify nothing");
+    let aged = with_gains(&bench.text("log.csv"), [0.998; 3]);
+    bench.write("aged.csv", aged);
+    let judged = |log: &str, words: &str, code: &str| {
+        let eval = format!("eval old.bin {log} --json eval.json");
+        bench.bad(&eval, 4, &[words]);
+        let json = bench.json("eval.json");
+        assert_eq!(json["verdict"], "refused");
+        assert_eq!(json["refusal"]["code"], code, "{json}");
+        json["findings"].as_array().map(Vec::len)
+    };
+    let words = "The errors in service are beyond the limit: ";
+    judged("aged.csv", words, "beyond_limit");
+    // No cable is blamed.
+    bench.good("simulate --plan run.csv --seed 4 --out other.csv");
+    let words = "Is it the blob of this stage?";
+    assert_eq!(judged("other.csv", words, "other_log"), Some(0));
 }

@@ -60,7 +60,7 @@ pub fn refusal(refusal: &Refusal, findings: &[Finding]) -> String {
             };
             let errors: Vec<String> = errors.iter().map(error).collect();
             format!(
-                "The errors {place} are beyond --limit: {}.",
+                "The errors {place} are beyond the limit: {}.",
                 errors.join("; ")
             )
         }
@@ -75,20 +75,19 @@ pub fn refusal(refusal: &Refusal, findings: &[Finding]) -> String {
             let (axis, unit) = (worst.axis.name, sign(worst.axis.micro));
             let [error, own] = [worst.rms, worst.limit].map(|x| x * 1e6);
             let what = format!(
-                "The parameter blob does not describe this log: its error in {axis} is {error:.2} {unit} rms, on its own logs it was {own:.2} {unit}, and the ratio is more than {factor} (--limit)."
+                "The parameter blob does not describe this log: its error in {axis} is {error:.2} {unit} rms, on its own logs it was {own:.2} {unit}, and the ratio is more than {factor} (--limit). Is it the blob of this stage?"
             );
             let refused = paragraph(findings, Severity::Refuse);
             let has_warning = findings.iter().any(|f| f.severity == Severity::Warn);
             let remedy = match (refused.as_str(), has_warning, is_field) {
-                // The warnings stand above.
-                ("", true, _) => return what,
+                ("", true, _) => "If it is, the log has the faults above.",
                 ("", false, true) => {
-                    "Is it the blob of this stage? If it is, and channels and scales are right, bring it up to date with host-fit recalibrate."
+                    "If it is, and channels and scales are right, bring it up to date with host-fit recalibrate."
                 }
                 ("", false, false) => {
-                    "If channels and scales are right, take the field model, with a log of all six axes moving at once."
+                    "If it is, and channels and scales are right, take the field model, with a log of all six axes moving at once."
                 }
-                (refused, ..) => refused,
+                (refused, ..) => return format!("{what} If it is: {refused}"),
             };
             format!("{what} {remedy}")
         }

@@ -42,6 +42,9 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
     )
 }
 
+/// A blob is judged on its own log.
+pub const OWN_LOG: &str = "The parameter blob was fitted to this log: the errors here verify nothing. Judge it on another log.";
+
 /// The largest motion with good errors.
 pub fn up_to(motion: &InMotion) -> String {
     let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
