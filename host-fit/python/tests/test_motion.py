@@ -1,11 +1,13 @@
 """Poses of a moving stage are corrected as in the controller."""
 
+import gzip
 from pathlib import Path
 from typing import Any
 
 import hallstage as hs
 import numpy as np
 import pytest
+from conftest import DATA, program_in
 
 AXES = ["x_m", "y_m", "rz_rad"]
 
@@ -69,6 +71,26 @@ def test_the_correction_is_that_of_the_controller_bit_for_bit(
     assert np.array_equal(dec(hall=fast.hall, caps=fast.caps, **commanded), corrected)
 
 
+def test_decode_corrects_a_log_with_its_trajectory_as_well_as_the_decoder_does(
+    in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any], coils: Path, tmp_path: Path
+) -> None:
+    rows = zip(gzip.open(coils / "fast.csv.gz", "rt"), (coils / "truth.csv").open(), strict=True)
+    names = "x_nm y_nm rz_nrad".split()
+    columns = [(coils / "truth.csv").open().readline().strip().split(",").index(name) for name in names]
+    with (tmp_path / "log.csv").open("w") as log:
+        for k, (row, pose) in enumerate(rows):
+            cells = [pose.split(",")[column] for column in columns]
+            cmd = [str(float(cell) * 1e-9) for cell in cells] if k else ["cmd_x_m", "cmd_y_m", "cmd_rz_rad"]
+            log.write(",".join([row.rstrip(), *cmd]) + "\n")
+    in_motion.save(tmp_path / "p.bin")
+    decode = ["decode", "p.bin", "log.csv", "--stage", DATA / "stage.toml"]
+    program_in(tmp_path)(*decode, "--out", "pose.npy", "--format", "npy")
+    dec = in_motion.decoder()
+    poses = [dec(fast), dec(fast, **commanded), np.load(tmp_path / "pose.npy")]
+    bare, mine, theirs = (np.std(planar(pose) - fast.reference, axis=0) for pose in poses)
+    assert np.all(theirs < 0.5 * bare) and np.allclose(theirs, mine, rtol=0.05), (bare, mine, theirs)
+
+
 def test_a_held_pose_is_the_last_corrected_one(in_motion: hs.Calibration, fast: hs.Log) -> None:
     dec, hall = in_motion.decoder(), fast.hall[:9].copy()
     hall[5:8, 0] = 32767
@@ -80,7 +102,7 @@ def test_a_held_pose_is_the_last_corrected_one(in_motion: hs.Calibration, fast: 
 
 
 def test_a_motion_that_cannot_be_used_is_named(
-    cal: hs.Calibration, in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
+    service: hs.Log, in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
 ) -> None:
     v, a = commanded["velocity"], commanded["acceleration"]
     endless = a.copy()
@@ -96,4 +118,4 @@ def test_a_motion_that_cannot_be_used_is_named(
         with pytest.raises(ValueError, match=words):
             in_motion.decoder()(fast, **wrong)
     with pytest.raises(ValueError, match="velocity, acceleration: the parameters have no motion correction"):
-        cal.decoder()(fast, **commanded)
+        hs.fit(service).decoder()(fast, **commanded)

@@ -130,7 +130,7 @@ fn a_log_that_cannot_identify_the_model_ends_with_status_4_and_no_blob() {
         ("dead", ["Hall C never changes", "connected"]),
         ("height", ["Z does not move", "record"]),
         ("no_tilt", ["Rx does not move", "record"]),
-        ("only_y", ["the stage moves along X", "record"]),
+        ("only_y", ["Rz does not move", "record"]),
         ("constant", ["Nothing moves", "record"]),
     ] {
         let fit = format!("fit {name}.csv --out p.bin --json p.json");
