@@ -40,6 +40,7 @@ pub use repair::Repair;
 pub use rows::FittedRows;
 pub use settings::{FitSettings, ModelChoice};
 pub use warning::{codes_refused, counted};
+pub(crate) use warning::{is_clear, is_significant};
 
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Judgement, Zeros};

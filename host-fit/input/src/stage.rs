@@ -145,6 +145,8 @@ pub struct Stage {
     /// Error of a reset of the interferometers in X, Y, Rz, standard deviation, m, m, rad; `None` where nothing
     /// is known of it, or where the Hall probes say where the stage is reset.
     pub reset_sd: Option<[f64; 3]>,
+    /// How long the rows of a log have the beams after the stage was there, s; `None` where it is not known.
+    pub latency_s: Option<f64>,
     /// Servo period, s.
     pub servo_period_s: f64,
     /// Search ranges.

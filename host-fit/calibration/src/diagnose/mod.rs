@@ -8,6 +8,7 @@
 //! | `mistakes` | mistakes with order, signs, scales and places |
 //! | [`structure`] | the mistake that explains a log |
 //! | [`fit_checks`] | findings about the fit itself |
+//! | `late` | a lag between the reference and all probes |
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`temperature`] | findings about temperature |
 //! | [`refusal`] | why a calibration is not to be used |
@@ -36,6 +37,7 @@
 mod columns;
 pub mod faults;
 pub mod fit_checks;
+mod late;
 mod limits;
 mod mistakes;
 pub mod range;
@@ -163,6 +165,11 @@ pub fn diagnose_log(
         InMotion::new(&motion, parameters, stage, &at_rest?)
     });
     let mut stays = columns.stays;
+    let late = out
+        .findings
+        .iter()
+        .filter_map(|found| late::in_service(found, stage));
+    late.for_each(|late| (0..3).for_each(|axis| stays[axis] += late[axis]));
     if let (Some(motion), Some(at_rest)) = (out.motion, at_rest) {
         out.findings.extend(motion.finding(&at_rest));
         (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
@@ -254,15 +261,10 @@ impl Diagnosis {
         if self.repair.is_none() {
             findings.extend(fit_checks::left_out(fit, dataset));
         }
-        // A fit takes one late beam for a lag of all beams.
-        let is_late = findings
-            .iter()
-            .any(|found| found.code() == Code::ReferenceLag);
-        let warnings = fit
-            .warnings(dataset, stage, self.predicted.as_ref())
-            .into_iter();
-        let warnings = warnings.filter(|found| !is_late || found.code() != Code::ReferenceLag);
-        findings.extend(warnings);
+        findings.extend(fit.warnings(dataset, stage));
+        let predicted = self.predicted.as_ref();
+        let late = late::late_reference(fit, self.repair.as_ref(), findings, stage, predicted);
+        findings.extend(late);
         findings.extend(temperature::findings(fit, dataset, stage));
         findings.extend(range::undeclared(fit, stage));
         let explains = |found: &Finding| {

@@ -17,6 +17,8 @@ pub struct Repair {
     pub covariance: DMatrix<f64>,
     /// Lags of the probes, and what acceleration adds to their readings.
     pub motion: MotionFit,
+    /// The lag of the reference behind the middle probe in the rows that were diagnosed, s.
+    pub lag_s: f64,
 }
 
 impl Fit {

@@ -1,8 +1,6 @@
 //! What a user should know of a fit that is good nevertheless.
 
 use super::Fit;
-use crate::judge::predicted::Predicted;
-use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
@@ -41,52 +39,17 @@ pub fn codes_refused(rows: usize) -> Option<Finding> {
 }
 
 /// Whether the lag of the reference is large and beyond doubt.
-pub(super) fn is_clear(lag: &ReferenceLag, stage: &Stage) -> bool {
+pub(crate) fn is_clear(lag: &ReferenceLag, stage: &Stage) -> bool {
     is_significant(lag) && lag.value_s.abs() > LAG_MIN * stage.servo_period_s
 }
 
-fn is_significant(lag: &ReferenceLag) -> bool {
+pub(crate) fn is_significant(lag: &ReferenceLag) -> bool {
     lag.value_s.abs() > LAG_ERRORS_MIN * lag.standard_error_s
 }
 
-/// A lag of the reference that is clear, or that costs more than a note in service if it is a lag of all probes.
-fn late_reference(
-    lag: &ReferenceLag,
-    stage: &Stage,
-    at_rest: Option<&Predicted>,
-) -> Option<Finding> {
-    let motion = &stage.motion.axes;
-    let cost = at_rest.map(|at_rest| {
-        let error =
-            |axis: usize| lag.value_s * motion[axis].service_speed_rms / at_rest.noise(axis);
-        let worst = [0, 1, 2]
-            .map(error)
-            .map(f64::abs)
-            .into_iter()
-            .fold(0.0, f64::max);
-        (1.0 + worst * worst).sqrt()
-    });
-    let is_felt = cost.is_some_and(|cost| severity(cost) > Severity::Note);
-    let kind = Kind::LateReference {
-        lag_us: lag.value_s * 1e6,
-        periods: lag.value_s / stage.servo_period_s,
-    };
-    let found = Finding {
-        cost,
-        ..Finding::new(kind)
-    };
-    let is_told = is_clear(lag, stage) || is_felt && is_significant(lag);
-    is_told.then(|| found.with_channel(Channel::Beams))
-}
-
 impl Fit {
-    /// What the user should know, of a fit to the rows of a dataset with the errors `predicted` for service.
-    pub fn warnings(
-        &self,
-        dataset: &Dataset,
-        stage: &Stage,
-        predicted: Option<&Predicted>,
-    ) -> Vec<Finding> {
+    /// What the user should know, of a fit to the rows of a dataset.
+    pub fn warnings(&self, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
         let mut warnings = Vec::new();
         let parameters = self.estimate.parameters.model_31();
         let at_limit = at_limit(stage, self.model, &parameters);
@@ -120,8 +83,6 @@ impl Fit {
         }
         let judgement = &self.judgement;
         warnings.extend(counted(&judgement.zeros, judgement.undecoded));
-        let lag = self.estimate.lag.as_ref();
-        warnings.extend(lag.and_then(|lag| late_reference(lag, stage, predicted)));
         warnings
     }
 }

@@ -116,7 +116,7 @@ fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
     });
     let [(floor, sound), (late, diagnosis)] = calibrated;
     assert!(sound.findings.is_empty(), "{:?}", sound.findings);
-    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+    assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
     let [found] = diagnosis.findings.as_slice() else {
         panic!("{:?}", diagnosis.findings);
     };

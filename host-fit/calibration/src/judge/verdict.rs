@@ -125,7 +125,10 @@ fn decide(findings: &[Finding], ratio: Option<f64>, is_for_service: bool) -> Ver
         let is_lost = match found.code().entry().trust {
             Trust::Kept => false,
             Trust::Lost => true,
-            Trust::LostOfSensors => found.channels().iter().any(|channel| !channel.is_beam()),
+            Trust::LostOfSensors => {
+                let mut causes = found.channels.iter().chain(&found.alike);
+                causes.any(|channel| !channel.is_beam())
+            }
         };
         is_lost && found.severity > Severity::Note
     };

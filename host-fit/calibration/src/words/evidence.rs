@@ -119,9 +119,13 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("the zero deviation of {movements} of {} is beyond its range (largest {largest_um:.1} µm)", counted(*of, "movement"))
         }
         Kind::CodesRefused { rows } => format!("the decoder refuses the codes of {}, which the errors leave out", counted(*rows, "row")),
-        Kind::LateReference { lag_us, periods } => {
-            let (lag_us, periods, way, cost) = (lag_us.abs(), periods.abs(), way(*lag_us), found.cost);
-            format!("the reference is {lag_us:.0} µs ({periods:.2} servo periods) {way} the probes. The fit takes this into account, but the log does not show which of them is late. If it is the reference, the calibration is right. If all probes are late, the pose is late in service{}", cost.map_or(String::new(), |cost| format!(": with errors of {cost:.2} times the noise floor in the motion that [motion] in stage.toml declares")))
+        Kind::LateReference { lag_us, periods, is_declared } => {
+            let in_motion = found.cost.map_or(String::new(), |cost| format!("errors of {cost:.2} times the noise floor in the motion that [motion] in stage.toml declares"));
+            let (us, periods) = (lag_us.abs(), periods.abs());
+            match is_declared {
+                true => format!("all probes are {us:.0} µs ({periods:.2} servo periods) {} the reference, whose declared latency is taken off. In service this makes {in_motion}", way(-lag_us)),
+                false => format!("the reference is {us:.0} µs ({periods:.2} servo periods) {} the probes. The log does not show which of them has the wrong time. If it is the reference, the calibration is right and this costs nothing in service. If it is all probes, service has {in_motion}", way(*lag_us)),
+            }
         }
         Kind::AtLimit { parameter, shown: (value, unit), .. } => {
             format!("the parameter {parameter} stands at an end of its search range or beyond ({value:.6} {unit})")

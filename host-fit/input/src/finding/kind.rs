@@ -210,8 +210,8 @@ kinds! {
     ZerosClipped { movements: usize, of: usize, largest_um: f64 } => Code::ZeroClipped, *movements as f64, "movements";
     /// Rows that the decoder refuses.
     CodesRefused { rows: usize } => Code::Saturated, *rows as f64, "rows";
-    /// The reference is later than the probes, in servo periods, too.
-    LateReference { lag_us: f64, periods: f64 } => Code::ReferenceLag, *lag_us, "us";
+    /// The reference is later than the probes, in servo periods, too; beside a latency that is declared, the probes are early.
+    LateReference { lag_us: f64, periods: f64, is_declared: bool } => Code::ReferenceLag, *lag_us, "us";
     /// A parameter stands at an end of its search range: its value as reports show it, and in SI.
     AtLimit { parameter: String, shown: (f64, &'static str), value: f64, unit: &'static str } => Code::TermsAtLimit, *value, *unit;
     /// Movements without a row in a draw.

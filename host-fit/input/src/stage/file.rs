@@ -26,6 +26,7 @@ const FULL_SCALES_M: (f64, f64) = (1e-6, 0.1);
 const RESETS: (f64, f64) = (1e-9, 1e-3);
 /// Servo periods that make sense, s.
 const PERIODS_S: (f64, f64) = (1e-6, 10.0);
+const LATENCIES_US: (f64, f64) = (-1e5, 1e5);
 /// Smallest area of the triangle of the capacitive sensors, as a part of its longest side squared.
 const TRIANGLE_MIN: f64 = 1e-3;
 /// Smallest determinant of the designed PM, m: with the paper's directions the distance of A and B
@@ -65,6 +66,7 @@ impl Stage {
             capacitive,
             interferometer: beams::interferometer(document)?,
             reset_sd: reset_sd(document)?,
+            latency_s: latency_s(document)?,
             servo_period_s: document.required("servo", "period_s", PERIODS_S, "s")?,
             search: search::ranges(document, &probes)?,
             motion: motion::motion(document)?,
@@ -99,6 +101,11 @@ fn designed_probes(document: &Document<'_>) -> Result<[Probe; 3], StageError> {
         place_m: places_m[k],
         theta_rad: theta_rad[k],
     }))
+}
+
+fn latency_s(document: &Document<'_>) -> Result<Option<f64>, StageError> {
+    let latency_us = document.number("interferometer", "latency_us", LATENCIES_US, "us")?;
+    Ok(latency_us.map(|us| us * 1e-6))
 }
 
 /// All three or none.

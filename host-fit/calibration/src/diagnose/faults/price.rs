@@ -100,15 +100,16 @@ impl Finder<'_> {
             && expected.worst_ratio() <= GOOD_MAX
             && self.calibrated.model == ModelKind::Field
             && (self.is_bent || !findings.is_empty());
+        let shows = self.calibrated.shows_acceleration;
+        let motion = MotionFit::new(estimate.values().as_slice(), &covariance, shows);
+        let middle = |values: [f64; 3]| values[0] - off_middle(values)[0];
+        let lag_s = middle(self.lags_s) + estimate.lag_s();
         let repair = Repair {
             parameters: estimate.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
-            motion: MotionFit::new(
-                estimate.values().as_slice(),
-                &covariance,
-                self.calibrated.shows_acceleration,
-            )
-            .with_other_lags(probe_lags_s),
+            // One late probe is no lag of all.
+            lag_s: lag_s - middle(motion.dynamics.probe_lag_s),
+            motion: motion.with_other_lags(probe_lags_s),
         };
         let judged = if is_better { &expected } else { &predicted };
         findings.extend(unexplained.as_ref().and_then(|more| more.finding(judged)));
