@@ -10,11 +10,13 @@ mod interferometer;
 mod motion;
 mod search;
 mod temperature;
+mod uncertainty;
 
 pub use error::{StageError, TextPosition};
 pub use interferometer::Interferometer;
 pub use motion::{AxisMotion, Motion};
 pub use temperature::TemperatureTable;
+pub use uncertainty::{Input, Uncertainty};
 
 use crate::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
@@ -155,6 +157,8 @@ pub struct Stage {
     pub motion: Motion,
     /// Temperatures in a log, and what is known of their effect.
     pub temperature: TemperatureTable,
+    /// Standard uncertainties of the drawing, the reference and the sensors.
+    pub uncertainty: Uncertainty,
     /// Which column of a log holds what.
     pub log: LogLayout,
 }

@@ -52,7 +52,7 @@ mod structure_tests;
 pub mod temperature;
 mod units;
 
-use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
+use crate::fit::{Estimate, Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
@@ -132,7 +132,9 @@ pub fn diagnose_log(
         Ok(_) => true,
         Err(error) => matches!(error, FitError::Failed(FitFailure::NotDescribed { .. })),
     };
-    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, is_described);
+    let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
+    let described = (is_described, estimate);
+    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, described);
     out.findings.extend(poor);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
@@ -175,18 +177,16 @@ pub fn diagnose_log(
         (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
     }
     out.conclude(stays, basis);
-    out.validity = field.and_then(|_| {
-        let estimate = fitted.ok().map(|fit| &fit.estimate)?;
-        let (mut parameters, mut covariance) =
-            (estimate.parameters, estimate.posterior.covariance.clone());
+    if let (Some(_), Ok(fit)) = (field, fitted) {
+        let estimate = &fit.estimate;
+        let (mut parameters, mut posterior) = (estimate.parameters, estimate.posterior.clone());
         if let Some(repair) = &out.repair {
             parameters = repair.parameters;
-            covariance
-                .view_mut((0, 0), repair.covariance.shape())
-                .copy_from(&repair.covariance);
+            posterior = posterior.with_parameters(&parameters, &repair.covariance);
         }
-        Validity::new(stage, &parameters, estimate.posterior.white_m, &covariance)
-    });
+        let (white_m, covariance) = (posterior.white_m, &posterior.covariance);
+        out.validity = Validity::new(stage, &parameters, white_m, covariance);
+    }
     out
 }
 
@@ -211,14 +211,14 @@ const fn stands(found: &Finding) -> bool {
 
 impl Diagnosis {
     /// Adds the faults of signals, channels and structure, and what they predict. The lags of A, B, C behind their
-    /// mean, s, where the log shows them. `is_described` where the parameters describe the log.
+    /// mean, s, where the log shows them. `is_described` where the parameters describe the log, `estimate` of a fit of the field model.
     fn add_faults(
         &mut self,
         dataset: &Dataset,
         without_outliers: &Dataset,
         stage: &Stage,
         by: Calibrated,
-        is_described: bool,
+        (is_described, estimate): (bool, Option<&Estimate>),
     ) -> Option<[f64; 3]> {
         let (findings, bad) = signals::signal_findings(dataset, stage, &self.columns);
         self.findings = findings;
@@ -226,16 +226,28 @@ impl Diagnosis {
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
         let rows = has_channels.then(|| find_faults(&dataset.without(&bad), stage, by, is_bent));
         let of_rows = rows.flatten();
-        // A repair that leads to residuals of noise explains the log; no mistake is needed.
-        let explains = |of: &Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
-        if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
-            let parts = |found: &Finding| found.code() == Code::LogsDisagree;
-            let disagree = of_rows
-                .as_ref()
-                .is_some_and(|of| of.findings.iter().any(parts));
-            let mistake = structure::structure(without_outliers, stage, disagree);
-            self.findings.extend(mistake);
-        }
+        // A repair that leads to residuals of noise explains the log, but not a drawing that it contradicts.
+        let explains = |of: &&Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
+        let repaired = of_rows
+            .as_ref()
+            .filter(explains)
+            .filter(|_| !is_refused(&self.findings));
+        let repaired = repaired.and_then(|of| of.repair.as_ref());
+        let parts = |found: &Finding| found.code() == Code::LogsDisagree;
+        let disagree = (of_rows.as_ref()).is_some_and(|of| of.findings.iter().any(parts));
+        // Faults that cost so much bend the fit.
+        let bends = |of: &Faults| is_refused(&of.findings);
+        let is_bent = is_refused(&self.findings) || of_rows.as_ref().is_some_and(bends);
+        let known = match (repaired, estimate) {
+            (Some((repair, _)), _) => Some((&repair.parameters, &repair.covariance)),
+            (None, Some(own)) if !is_bent => Some((&own.parameters, &own.posterior.covariance)),
+            _ => None,
+        };
+        let mistake = structure::structure(without_outliers, stage, disagree, known);
+        let stands_alone = |found: &Finding| {
+            repaired.is_none() || matches!(found.kind, Kind::Mistake { is_sure: true, .. })
+        };
+        self.findings.extend(mistake.filter(stands_alone));
         let mut of = of_rows?;
         self.predicted = of.predicted;
         if is_refused(&self.findings) {
@@ -328,7 +340,7 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    out.add_faults(dataset, dataset, stage, by, true);
+    out.add_faults(dataset, dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     out.findings
