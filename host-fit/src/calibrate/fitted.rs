@@ -179,6 +179,7 @@ impl JudgedFit {
         let known = StoredPosterior::from_fit(self.fitted.as_ref().ok()?)?;
         Some(StoredPosterior {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
+            budget: self.diagnosis.budget.clone(),
             ..known
         })
     }

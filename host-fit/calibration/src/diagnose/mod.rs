@@ -52,6 +52,7 @@ mod structure_tests;
 pub mod temperature;
 mod units;
 
+use crate::budget::Budget;
 use crate::fit::{Estimate, Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::InMotion;
@@ -66,6 +67,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::terms::COUNT;
 pub use limits::ERROR_TO_NOISE_MAX;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
@@ -86,6 +88,8 @@ pub struct Diagnosis {
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log: see [`Fit::repaired`]. The verdict is about them.
     pub repair: Option<Repair>,
+    /// The uncertainty in service, source by source, of a calibration by the field model.
+    pub budget: Option<Budget>,
     /// How far from the temperature of the log a calibration by the field model is good.
     pub validity: Option<Validity>,
     /// What speed and acceleration add in service; [`Self::predicted`] includes it.
@@ -177,7 +181,7 @@ pub fn diagnose_log(
         (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
     }
     out.conclude(stays, basis);
-    if let (Some(_), Ok(fit)) = (field, fitted) {
+    if let (Some(figures), Ok(fit)) = (field, fitted) {
         let estimate = &fit.estimate;
         let (mut parameters, mut posterior) = (estimate.parameters, estimate.posterior.clone());
         if let Some(repair) = &out.repair {
@@ -186,6 +190,10 @@ pub fn diagnose_log(
         }
         let (white_m, covariance) = (posterior.white_m, &posterior.covariance);
         out.validity = Validity::new(stage, &parameters, white_m, covariance);
+        let known = (&parameters, &posterior);
+        let freedom = figures.score.residuals.saturating_sub(COUNT);
+        out.budget = (out.predicted.as_ref())
+            .and_then(|of| Budget::new(stage, known, &estimate.temperature, of, freedom));
     }
     out
 }

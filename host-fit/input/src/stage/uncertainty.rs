@@ -1,4 +1,4 @@
-//! Reads the optional table `[uncertainty]`: standard uncertainties of inputs that no log shows. A key that it leaves out
+//! Reads the optional table `[uncertainty]`: standard uncertainties of inputs that no log shows. A missing key
 //! has its default; an input without one is not known.
 //!
 //! ```toml
@@ -54,20 +54,6 @@ const TABLE: [(&str, &str, f64, Option<f64>); 10] = [
 ];
 
 impl Input {
-    /// All, in the order of [`TABLE`].
-    pub const ALL: [Self; TABLE.len()] = [
-        Self::ProbePlaces,
-        Self::Sensitivity,
-        Self::GapPlaces,
-        Self::GapScale,
-        Self::BeamScale,
-        Self::Baseline,
-        Self::BeamPlaces,
-        Self::BeamAngles,
-        Self::Temperature,
-        Self::Drift,
-    ];
-
     /// Its key in the table.
     pub const fn key(self) -> &'static str {
         TABLE[self as usize].0
@@ -95,7 +81,7 @@ impl Uncertainty {
     }
 }
 
-/// The table, with defaults where it leaves them out.
+/// The table, with defaults for missing keys.
 pub(super) fn uncertainty(document: &Document<'_>) -> Result<Uncertainty, StageError> {
     let mut out = TABLE.map(|(.., default)| default);
     for (value, (key, unit, most, _)) in out.iter_mut().zip(TABLE) {
@@ -112,6 +98,20 @@ mod tests {
     use crate::stage::Stage;
     use crate::stage::tests::SOUND;
 
+    /// In the order of [`TABLE`].
+    const ALL: [Input; TABLE.len()] = [
+        Input::ProbePlaces,
+        Input::Sensitivity,
+        Input::GapPlaces,
+        Input::GapScale,
+        Input::BeamScale,
+        Input::Baseline,
+        Input::BeamPlaces,
+        Input::BeamAngles,
+        Input::Temperature,
+        Input::Drift,
+    ];
+
     fn parse(text: &str) -> Result<Uncertainty, String> {
         let stage = Stage::from_toml(&format!("{SOUND}{text}"), "stage.toml".as_ref());
         stage
@@ -121,12 +121,12 @@ mod tests {
 
     #[test]
     fn an_input_has_the_value_of_its_key_or_its_default() {
-        for (k, input) in Input::ALL.into_iter().enumerate() {
+        for (k, input) in ALL.into_iter().enumerate() {
             assert_eq!(input as usize, k);
             let (key, value) = (input.key(), 1.5e-3);
             let found = parse(&format!("[uncertainty]\n{key} = {value}\n")).expect("sound");
             let defaults = parse("").expect("sound");
-            for other in Input::ALL {
+            for other in ALL {
                 let want = match other == input {
                     true => Some(value),
                     false => defaults.get(other),

@@ -69,7 +69,7 @@ impl FieldParameters {
         designed
     }
 
-    /// The parameters with these values: those of A, then of B, then of C.
+    /// The parameters with these values: A, then B, then C.
     pub fn from_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
@@ -264,8 +264,8 @@ pub fn place_m(stage: &Stage) -> f64 {
 /// Standard deviation of a temperature coefficient (1/K) or a change by acceleration (m per m/s2) that stays at its prior.
 pub const HELD: f64 = 1e-12;
 
-/// All unknowns with their prior: the probes stand within `place_m` (standard deviation) of `places`, `temperature` are the prior standard deviations of k and h, `acceleration` of the
-/// changes by acceleration.
+/// All unknowns with their prior. Standard deviations: `place_m` of the places of the probes, `temperature` of k and h,
+/// `acceleration` of the changes by acceleration.
 pub fn unknowns(
     (places, place_m): (&[[f64; 2]; 3], f64),
     temperature: [f64; 2],
