@@ -2,6 +2,7 @@
 
 mod air;
 mod beams;
+mod certificate;
 mod columns;
 mod document;
 mod error;
@@ -12,6 +13,7 @@ mod search;
 mod temperature;
 mod uncertainty;
 
+pub use certificate::{CertificateTable, TEXTS};
 pub use error::{StageError, TextPosition};
 pub use interferometer::Interferometer;
 pub use motion::{AxisMotion, Motion};
@@ -159,6 +161,8 @@ pub struct Stage {
     pub temperature: TemperatureTable,
     /// Standard uncertainties of the drawing, the reference and the sensors.
     pub uncertainty: Uncertainty,
+    /// What a certificate says beside the results, and when a calibration conforms.
+    pub certificate: CertificateTable,
     /// Which column of a log holds what.
     pub log: LogLayout,
 }

@@ -22,6 +22,7 @@ use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
 use host_fit::report::budget;
 use host_fit::report::errors::{errors, from_rms_and_peak};
+use host_fit::report::page::CERTIFICATE;
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::update::Change;
@@ -362,7 +363,7 @@ impl Calibration {
     ) -> PyResult<()> {
         let (of, _) = self.fit_or_raise("report")?;
         let about = About {
-            title: "Calibration certificate",
+            title: CERTIFICATE,
             serial: &self.set.serial,
             operator,
             notes: notes.unwrap_or_default(),

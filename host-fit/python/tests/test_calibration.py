@@ -121,7 +121,7 @@ def test_an_evaluation_has_the_figures_of_the_program_and_a_page(
     assert str(DATA) not in text
     assert len(v.residuals()) == len(service)
     cal.report(tmp_path / "fit.html", operator="me")
-    assert "Calibration certificate" in (tmp_path / "fit.html").read_text()
+    assert "Calibration report" in (tmp_path / "fit.html").read_text()
 
 
 def test_a_calibration_of_another_stage_is_refused_by_an_evaluation(

@@ -157,9 +157,12 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         let rms = of.errors.map(|errors| errors.axes[k].rms);
         let service = predicted.map(|predicted| predicted.rms[k]);
         let noise = predicted.map(|predicted| predicted.rms[k] / predicted.ratio[k]);
+        // A sensor that stays wrong may exceed it without a refusal.
+        let is_refused = of.diagnosis.verdict == Some(Verdict::Refused);
         let own = noise
             .filter(|_| of.is_field)
             .map(|noise| LIMITED_MAX * noise);
+        let own = own.filter(|own| is_refused || service <= Some(*own));
         let (limit, measured) = match of.in_service {
             true => (
                 of.limits[k].into_iter().chain(own).reduce(f64::min),

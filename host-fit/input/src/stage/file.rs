@@ -6,7 +6,8 @@
 use super::document::{Document, Value};
 use super::error::StageError;
 use super::{
-    CodeScale, Probe, Stage, beams, columns, motion, paper_signs, search, temperature, uncertainty,
+    CodeScale, Probe, Stage, beams, certificate, columns, motion, paper_signs, search, temperature,
+    uncertainty,
 };
 use crate::source;
 use nalgebra::Matrix3;
@@ -75,6 +76,7 @@ impl Stage {
             motion: motion::motion(document)?,
             temperature: temperature::temperature(document)?,
             uncertainty,
+            certificate: certificate::certificate(document)?,
             log: columns::log_layout(document)?,
         };
         Ok(stage)
