@@ -233,10 +233,7 @@ impl Lines {
                         "correct it for another converter",
                     );
                 }
-                _ if line.is_empty()
-                    || line.starts_with(['[', '#'])
-                    || matches!(table, "motion" | "uncertainty") =>
-                {
+                _ if line.is_empty() || line.starts_with(['[', '#']) || table == "motion" => {
                     let _ = writeln!(self.text, "{line}");
                 }
                 _ => {

@@ -73,7 +73,6 @@ impl ReportArgs {
             provenance,
             warnings: words::messages(&log.warnings),
             report: None,
-            as_found: None,
         }
     }
 

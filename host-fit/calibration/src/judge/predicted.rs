@@ -71,10 +71,13 @@ impl Predicted {
         self.rms[axis] / self.ratio[axis]
     }
 
-    /// With other errors that add these variances: m2, m2, rad2.
+    /// With other errors that add these variances (m2, m2, rad2), or cancel known ones.
     #[must_use]
     pub fn with_added(&self, variances: [f64; 3]) -> Self {
-        let more = |rms: f64, axis: usize| (rms * rms + variances[axis]).sqrt();
+        let more = |rms: f64, axis: usize| {
+            let least = self.noise(axis);
+            (rms * rms + variances[axis]).max(least * least).sqrt()
+        };
         let rms = [0, 1, 2].map(|axis| more(self.rms[axis], axis));
         Self {
             rms,

@@ -3,7 +3,7 @@
 use super::causes::mistake;
 use super::finding::is_late_sensor;
 use hallstage_input::axis::{counted, sign};
-use hallstage_input::finding::{Finding, Kind, Quantity, TimeCourse};
+use hallstage_input::finding::{Finding, Kind, Place, Quantity, TimeCourse};
 
 /// Names in a list at most.
 const NAMED_MAX: usize = 10;
@@ -95,6 +95,9 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::OtherProbes { tolerances } => {
             format!("the fitted probes differ from stage.toml by {tolerances:.1} times the tolerances of directions, sensitivities and places, and no single mistake explains it")
         }
+        Kind::LeftOut { rows, of, percent, end: Place { movement, t_us } } => {
+            format!("{rows} of {of} rows ({percent:.1} %) are so far from the fitted model that they count little or nothing in the fit; the last is in movement {movement} at t_us = {t_us}. With --loss none every row counts")
+        }
         Kind::ShortMovements { mean_rows, hidden_percent } => {
             format!("the movements have {mean_rows:.1} rows on average. Each has a zero deviation of its own, which hides about {hidden_percent:.0} % of the errors")
         }
@@ -171,10 +174,18 @@ pub(super) fn evidence(found: &Finding) -> String {
     }
 }
 
-/// A change of a channel, or of several that explain the log alike.
+/// A change of a channel, of several together, or of others that explain the log alike.
 fn change(found: &Finding, quantity: Quantity, course: &TimeCourse, size: f64) -> String {
-    let causes = found.channels.iter().chain(&found.alike);
-    let titles: Vec<&str> = causes.map(|channel| channel.title()).collect();
+    let titles: Vec<&str> = found
+        .channels
+        .iter()
+        .map(|channel| channel.title())
+        .collect();
+    let others = found.alike.iter().map(|channel| channel.title());
+    let whose: Vec<String> = [titles.join(" and ")]
+        .into_iter()
+        .chain(others.map(str::to_owned))
+        .collect();
     let what = match quantity {
         Quantity::Gain => "gain",
         Quantity::Zero => "zero",
@@ -188,18 +199,21 @@ fn change(found: &Finding, quantity: Quantity, course: &TimeCourse, size: f64) -
             way(size)
         ),
         TimeCourse::Log(log) => format!("in {log} differs by {size:+.2} {unit} from before"),
+        TimeCourse::Onset if titles.len() > 1 => {
+            format!("change together by up to {size:+.2} {unit}")
+        }
         TimeCourse::Onset => format!("changes by {size:+.2} {unit}"),
         TimeCourse::OverLog => format!("drifts by {size:+.2} {unit} over the log"),
         TimeCourse::OverMovement => format!("drifts by {size:+.2} {unit}/s within movements"),
     };
-    let undecided = if titles.len() > 1 {
+    let undecided = if whose.len() > 1 {
         ". The log does not show which"
     } else {
         ""
     };
     format!(
         "the {what} of {} {how}{undecided}{}",
-        titles.join(" or "),
+        whose.join(" or "),
         cost(found)
     )
 }

@@ -15,15 +15,15 @@ pub const SHAPE: usize = 18;
 pub(super) const SHAPE_UNIT_M: f64 = 1e-3;
 
 /// Place of the lever arm among the parameters of a probe.
-pub const LEVER_ARM: usize = 0;
+pub(super) const LEVER_ARM: usize = 0;
 /// Place of theta.
-pub const THETA: usize = 1;
+pub(super) const THETA: usize = 1;
 /// Place of eta.
-pub const ETA: usize = 2;
+pub(super) const ETA: usize = 2;
 /// Place of a, b, c.
-pub const SLOPES: usize = 3;
+pub(super) const SLOPES: usize = 3;
 /// Place of E.
-pub const CARRY: usize = 6;
+pub(super) const CARRY: usize = 6;
 /// Place of the coefficients of p.
 pub(super) const SHAPES: usize = 9;
 

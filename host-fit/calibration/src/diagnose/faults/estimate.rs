@@ -93,7 +93,7 @@ impl Estimate {
         faults: &[Vec<[f64; 3]>],
     ) -> Option<Self> {
         let size = UNKNOWNS + faults.len();
-        let mut prior = unknowns((&places, means.place_m), [HELD; 2], means.acceleration).prior;
+        let mut prior = unknowns(&places, [HELD; 2], means.acceleration).prior;
         let flat = (0..COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31);
         for k in flat.chain([LAG]) {
             prior[(k, k)] += 1.0 / (FLAT * FLAT);
@@ -141,7 +141,7 @@ impl Estimate {
         Self::descend(means, places, self.at.clone(), self.noise, faults)
     }
 
-    /// Lags of the beams X, Y1, Y2, s. The faults are the lags of Y1 and Y2 behind X, ms. A lag is 0 where its square
+    /// Lags of the beams X, Y1, Y2, s. The first faults are the lags of Y1 and Y2 behind X, ms. A lag is 0 where its square
     /// is less than `likely` times its variance.
     pub(super) fn lags_s(&self, likely: f64) -> [f64; 3] {
         let covariance = self.curvature.inverse();

@@ -5,7 +5,8 @@ use super::effects::Shape;
 use super::score::Fault;
 use crate::judge::predicted::Predicted;
 use crate::judge::verdict::severity;
-use hallstage_input::finding::{Finding, Kind, TimeCourse};
+use hallstage_input::channel::Channel;
+use hallstage_input::finding::{Finding, Kind, Quantity, TimeCourse};
 
 impl Finder<'_> {
     /// The movement and the time of a mean, and its log if the log begins there.
@@ -26,17 +27,23 @@ impl Finder<'_> {
         found.with_place(movement, t_us).with_cost(cost)
     }
 
-    /// A fault of this size, in the unit of its quantity.
-    pub(super) fn finding(&self, fault: &Fault, size: f64, cost: f64) -> Finding {
+    /// A change of a quantity by faults that begin together; the size of the largest, in the unit of the quantity.
+    pub(super) fn change(
+        &self,
+        quantity: Quantity,
+        faults: &[&Fault],
+        size: f64,
+        cost: f64,
+    ) -> Finding {
+        let fault = faults[0];
         let (movement, t_us, log) = self.place(fault.shape.onset().unwrap_or(0));
         let course = match (fault.shape, log) {
             (Shape::From(0, _), _) => TimeCourse::Constant,
             (Shape::From(..), Some(log)) => TimeCourse::Log(log),
             (Shape::From(..), None) => TimeCourse::Onset,
-            (Shape::Ramp, _) => TimeCourse::OverLog,
+            (Shape::Ramp | Shape::Arc, _) => TimeCourse::OverLog,
             (Shape::RampInMovements, _) => TimeCourse::OverMovement,
         };
-        let quantity = fault.suspect.quantity;
         let mut found = Finding::new(Kind::Change {
             quantity,
             course,
@@ -45,9 +52,12 @@ impl Finder<'_> {
         if fault.shape.onset().is_some() {
             found = found.with_place(movement, t_us);
         }
+        let channels: Vec<Channel> = faults.iter().map(|fault| fault.suspect.channel()).collect();
+        let others = faults.iter().flat_map(|fault| fault.alike.clone());
         Finding {
-            alike: fault.alike.clone(),
-            ..found.with_channel(fault.suspect.channel())
+            alike: others.filter(|other| !channels.contains(other)).collect(),
+            channels,
+            ..found
         }
         .with_severity(severity(cost))
         .with_cost(cost)

@@ -6,7 +6,7 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::dynamics::{Dynamics, PER_ACCELERATION};
-use hallstage_solver::estimator::parameters::{FieldParameters, HELD, place_m};
+use hallstage_solver::estimator::parameters::{FieldParameters, HELD};
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::Rows;
 use hallstage_solver::estimator::terms::COUNT;
@@ -27,8 +27,6 @@ pub(super) struct Means {
     pub(super) white_m: [f64; 3],
     /// Errors of the resets, m, m, rad, where they are declared.
     pub(super) resets: Option<[f64; 3]>,
-    /// Prior standard deviation of the places of the probes, m.
-    pub(super) place_m: f64,
     /// Prior standard deviation of what acceleration adds to the readings, m per m/s2.
     pub(super) acceleration: f64,
 }
@@ -90,7 +88,6 @@ impl Means {
             first,
             white_m,
             resets: stage.reset_sd,
-            place_m: place_m(stage),
             acceleration: if shows_acceleration {
                 PER_ACCELERATION
             } else {
@@ -110,9 +107,11 @@ impl Means {
         libm::log(3.0 * self.rows.rows.len() as f64)
     }
 
-    /// The gain that a fault needs: it is one unknown out of all suspects and onsets, and rare.
-    pub(super) fn per_fault(&self) -> f64 {
-        let choices = suspects().count() * self.rows.rows.len();
-        self.per_unknown() + 2.0 * libm::log(RARITY * choices as f64)
+    /// The gain that a fault needs: it is one unknown out of all suspects, and of all means if its onset is unknown.
+    pub(super) fn per_fault(&self, with_onset: bool, is_rare: bool) -> f64 {
+        let onsets = if with_onset { self.rows.rows.len() } else { 1 };
+        let choices = (suspects(true).count() * onsets) as f64;
+        let rarity = if is_rare { RARITY } else { 1.0 };
+        self.per_unknown() + 2.0 * libm::log(rarity * choices)
     }
 }

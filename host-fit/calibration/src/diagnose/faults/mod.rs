@@ -6,16 +6,14 @@
 //! | `estimate` | the most likely parameters, with faults as further unknowns |
 //! | `effects` | the effect on the Hall signals of every fault that is looked for |
 //! | `score` | the fault that explains the residuals best, with the parameters profiled out |
-//! | `motion` | errors of channels that follow the motion, in a log and in service |
-//! | `evidence` | what the residuals still show after all faults |
+//! | `search` | the faults, one after the other as long as they explain more than chance |
+//! | `motion` | what errors of channels follow, in a log and in service |
 //! | `slow` | slow residuals beyond noise and drift |
-//! | `unexplained` | their cost in service |
 //! | `price` | the cost of the faults, and the repair |
 //! | `findings` | the faults as findings |
 
 mod effects;
 mod estimate;
-mod evidence;
 #[cfg(test)]
 mod evidence_tests;
 mod findings;
@@ -23,21 +21,20 @@ mod means;
 mod motion;
 mod price;
 mod score;
+mod search;
 #[cfg(test)]
 mod service_tests;
 mod slow;
 #[cfg(test)]
 mod tests;
-mod unexplained;
 
-use super::limits::{ROUNDS, UNDECIDED};
+use super::limits::ROUNDS;
 use crate::fit::{Repair, with_beams_later};
 use crate::judge::predicted::{Predicted, declared_service};
 use crate::judge::verdict::LIMITED_MAX;
-use effects::{Effects, Suspect};
+use effects::{Effects, Shape, Suspect};
 use estimate::Estimate;
 use findings::not_determined;
-use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::stage::Stage;
@@ -48,15 +45,13 @@ use hallstage_solver::estimator::service::Service;
 use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
 use means::Means;
 use runtime::ModelKind;
-use score::{Fault, Scan, Split, split};
+use score::{Fault, Split, split};
 use std::borrow::Cow;
 
 /// Maximum number of faults of one log.
-const FAULTS_MAX: usize = 6;
+const FAULTS_MAX: usize = 11;
 /// A lag beyond this part of a servo period is taken off before other faults are looked for.
 const LAG_MAX: f64 = 0.5;
-/// Causes are undecided where their gains differ by less than this part: large faults are not quite linear.
-const ALIKE_PART: f64 = 0.01;
 /// The faults of a log.
 #[derive(Debug, Default)]
 pub struct Faults {
@@ -113,14 +108,16 @@ pub fn find_faults(
     let mut rounds = 0..ROUNDS;
     let first = loop {
         let effects = Effects::new(&finder.means, stage, &start, 0.0);
-        let late = [1, 2].map(|beam| effects.constant(Suspect::late(beam)));
+        // Probes may be late, too.
+        let late = [4, 5, 0, 1].map(Suspect::late);
+        let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
         let first = Estimate::first(&finder.means, &start, &late)?;
-        let beyond_s = first.lags_s(finder.means.per_fault());
-        (0..3).for_each(|beam| finder.lags_s[beam] += beyond_s[beam]);
+        let beyond_s = first.lags_s(finder.means.per_fault(true, true));
         if !beyond_s.iter().any(|lag_s| finder.is_lag(*lag_s)) || rounds.next().is_none() {
             break first;
         }
         // A lag is not linear.
+        (0..3).for_each(|beam| finder.lags_s[beam] += beyond_s[beam]);
         let later = with_beams_later(dataset, stage, finder.lags_s);
         start = first.parameters;
         finder.means = Means::new(&later, stage, &start, calibrated.shows_acceleration);
@@ -165,42 +162,6 @@ impl Finder<'_> {
         estimate.with_faults(&self.means, &columns.collect::<Vec<_>>())
     }
 
-    /// The faults, one after the other as long as they explain more than chance, and the estimate with the faults
-    /// among its unknowns; `None` where there are no faults.
-    fn search(&self, faultless: &Estimate) -> Option<(Vec<Fault>, Option<Estimate>)> {
-        let (mut faults, mut last): (Vec<Fault>, Option<Estimate>) = (Vec::new(), None);
-        while faults.len() < FAULTS_MAX {
-            let estimate = last.as_ref().unwrap_or(faultless);
-            let mut found = Scan::new(&self.effects(estimate), estimate)?.faults();
-            found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-            let before = estimate.chi_squared;
-            let counts = |gain: f64| self.gain(before, before - gain) > self.means.per_fault();
-            let Some(best) = found.first().filter(|best| counts(best.gain)) else {
-                break;
-            };
-            let near = best.gain - f64::max(UNDECIDED, ALIKE_PART * best.gain);
-            let others = found.iter().filter(|other| other.gain > near);
-            let mut alike: Vec<Channel> = others.map(|other| other.suspect.channel()).collect();
-            alike.retain(|channel| *channel != best.suspect.channel());
-            // Several shapes of one channel may explain the log.
-            alike.sort_unstable();
-            alike.dedup();
-            faults.push(Fault {
-                alike,
-                ..best.clone()
-            });
-            // A large fault bends the effects of the others, too.
-            let next = self.refitted(estimate, &faults);
-            let Some(next) = next.and_then(|next| self.refitted(&next, &faults)) else {
-                // The log can no longer separate it from the others.
-                faults.pop();
-                break;
-            };
-            last = Some(next);
-        }
-        Some((faults, last))
-    }
-
     /// The curvature of the calibration's own model.
     fn own_curvature(&self, estimate: &Estimate) -> Option<Factor> {
         estimate.without_faults(match self.calibrated.model {
@@ -228,11 +189,19 @@ impl Finder<'_> {
         let residual = (estimate.chi_squared / self.means.freedom()).sqrt();
         // Two stages are a fault with a known onset that explain more than all faults.
         let gain = |to: f64, penalty: f64| self.gain(faultless.chi_squared, to) - penalty;
-        let by_faults = faults.len() as f64 * self.means.per_fault();
+        let by_faults: f64 = (0..faults.len())
+            .map(|number| self.needs(&faults[number], &faults[..number]))
+            .sum();
         let by_faults = gain(estimate.chi_squared, by_faults).max(0.0);
         let penalty = COUNT as f64 * self.means.per_unknown();
         let onsets = faults.iter().filter_map(|fault| fault.shape.onset());
-        let other = split(faultless, onsets);
+        // Logs may be of two stages.
+        let log = |at: &usize| {
+            let row = &self.dataset.rows[self.means.first[*at]];
+            self.dataset.movements[row.movement].log
+        };
+        let starts = (1..self.means.first.len()).filter(|at| log(at) != log(&(at - 1)));
+        let other = split(faultless, onsets.chain(starts));
         let other =
             other.filter(|other| gain(faultless.chi_squared - other.gain, penalty) > by_faults);
         let alone = |finding: Finding, predicted: Predicted| Faults {
@@ -255,7 +224,7 @@ impl Finder<'_> {
             let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
             alone(self.other_state(from, predicted.worst_ratio()), predicted)
         } else {
-            self.priced(&faults, estimate, &declared, residual)?
+            self.priced(&faults, (faultless, estimate), &declared, residual)?
         };
         if is_open && !decides {
             let open = not_determined(&own).with_severity(Severity::Warn);

@@ -2,18 +2,20 @@
 
 use super::effects::{Shape, Suspect};
 use super::estimate::Estimate;
+use super::motion::{Follows, squares_at_work};
 use super::score::Fault;
-use super::unexplained::Unexplained;
+use super::slow::slow_m2;
 use super::{Faults, Finder};
 use crate::fit::Repair;
 use crate::judge::predicted::Predicted;
-use crate::judge::verdict::{GOOD_MAX, severity};
+use crate::judge::verdict::{GOOD_MAX, NOTE_MAX, severity};
 use hallstage_input::channel::Channel;
-use hallstage_input::finding::{Quantity, Severity};
+use hallstage_input::finding::{Finding, Kind, Quantity, Severity};
 use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::service::Service;
 use hallstage_solver::estimator::terms::COUNT;
-use nalgebra::DMatrix;
+use hallstage_solver::estimator::whiten::UNKNOWNS;
+use nalgebra::{DMatrix, DVector};
 use runtime::ModelKind;
 
 /// Maximum number of repairs per channel. Steps and ramps can follow any other course, but do not describe it.
@@ -28,95 +30,213 @@ fn off_middle(values: [f64; 3]) -> [f64; 3] {
     values.map(|x| x - sorted[1])
 }
 
+/// What stays wrong in service.
+struct Stays {
+    /// Errors of sensors, with their sizes.
+    sensors: Vec<(usize, Follows, f64)>,
+    /// Whether all errors that follow the motion are forms of sensors.
+    are_forms: bool,
+    /// Lags of A, B, C, s, unless they are among these errors.
+    probe_lags_s: [f64; 3],
+}
+
+impl Stays {
+    fn new(faults: &[Fault], sizes: &[f64]) -> Self {
+        let (mut sensors, mut are_forms, mut probe_lags_s) = (Vec::new(), true, [0.0; 3]);
+        for (Fault { suspect, .. }, size) in faults.iter().zip(sizes) {
+            for channel in suspect.channels() {
+                match (suspect.quantity(), channel) {
+                    (None, 3..6) => are_forms = false,
+                    (None, _) => {
+                        are_forms &= suspect.follows.is_form();
+                        sensors.push((channel, suspect.follows, *size));
+                    }
+                    (Some(Quantity::Time), 0..3) => probe_lags_s[channel] += 1e-3 * size,
+                    (Some(Quantity::Time), 6..) => sensors.push((channel, suspect.follows, *size)),
+                    // Nothing shows before or after which change of its gain the reference is right.
+                    (Some(Quantity::Gain), 3..6) => {
+                        are_forms = false;
+                        sensors.push((channel, suspect.follows, -size));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let mean_s = probe_lags_s.iter().sum::<f64>() / 3.0;
+        probe_lags_s = probe_lags_s.map(|lag_s| lag_s - mean_s);
+        if !sensors.is_empty() {
+            // Lags of the probes add to the other errors.
+            let lags_s = std::mem::take(&mut probe_lags_s).into_iter().enumerate();
+            sensors.extend(lags_s.map(|(probe, s)| (probe, Follows::OwnSpeed, 1e3 * s)));
+        }
+        Self {
+            sensors,
+            are_forms,
+            probe_lags_s,
+        }
+    }
+}
+
+/// Whether zeros change together, as where a mount moves.
+fn is_one_event(a: &Fault, b: &Fault) -> bool {
+    let of_zero = |fault: &Fault| fault.suspect.follows == Follows::Zero;
+    of_zero(a) && of_zero(b) && a.shape.onset().is_some() && a.shape.onset() == b.shape.onset()
+}
+
 impl Finder<'_> {
-    /// The cost of the faults, and the estimate with the faults as a repair where that is the better calibration.
+    /// The cost of the faults, and the estimate with the changes as a repair where that is the better calibration.
     pub(super) fn priced(
         &self,
         faults: &[Fault],
-        estimate: &Estimate,
+        (faultless, estimate): (&Estimate, &Estimate),
         declared: &Service,
         residual: f64,
     ) -> Option<Faults> {
+        let by = self.calibrated;
         // Residuals that no fault explains make the parameters less certain.
         let inflation = residual.max(1.0).powi(2);
+        let covariance = estimate.covariance() * inflation;
+        let bent = self.own_curvature(estimate)?;
+        let stays = Stays::new(faults, estimate.sizes());
+        // The noise of what is estimated beside the parameters.
+        let systematic = |covariance: &DMatrix<f64>| declared.variance(covariance).systematic;
+        let [with, without] = [&estimate.curvature, &bent].map(|of| systematic(&of.inverse()));
+        let slow = match by.is_for_service {
+            true => declared.by_signals(slow_m2(&self.effects(estimate), estimate)),
+            false => [0.0; 3],
+        };
+        // Variances by errors of the parameters, which sensors that stay wrong make larger or smaller.
+        let variances = |off: &[f64]| {
+            let known = declared.squares(off);
+            let at_work = match stays.sensors.is_empty() {
+                true => [0.0; 3],
+                false => {
+                    squares_at_work((self.stage, declared), by.parameters, off, &stays.sensors)
+                }
+            };
+            [0, 1, 2].map(|axis| {
+                let own = known[axis] - inflation * (with[axis] - without[axis]);
+                match !stays.sensors.is_empty() && stays.are_forms {
+                    true => at_work[axis],
+                    false => own.max(at_work[axis]),
+                }
+            })
+        };
+        let in_service = |predicted: Predicted, off: &[f64]| match by.is_for_service {
+            true => {
+                let (known, whole) = (declared.squares(off), variances(off));
+                predicted.with_added([0, 1, 2].map(|axis| slow[axis] + whole[axis] - known[axis]))
+            }
+            // Other models lack terms, and are not for service.
+            false => predicted,
+        };
         let (predicted, off) = self.expected(estimate, declared, inflation)?;
-        let (own_cost, bent) = (predicted.worst_ratio(), self.own_curvature(estimate)?);
+        let predicted = in_service(predicted, &off);
+        let own_cost = predicted.worst_ratio();
         let is_felt = |cost: f64| severity(cost) > Severity::Note;
-        let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), self.calibrated.is_fitted);
-        let (mut findings, mut channels) = (Vec::new(), Vec::new());
-        let (mut lags_s, mut probe_lags_s) = (self.lags_s, [0.0; 3]);
+        let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), by.is_fitted);
+        let (mut findings, mut channels, mut changes) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut lags_s, mut by_motion) = (self.lags_s, DVector::zeros(UNKNOWNS));
+        // The changes by event, with their sizes and what they add to the gradient.
+        let mut events: Vec<(Vec<&Fault>, f64, DVector<f64>)> = Vec::new();
         for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
-            let off = bent.solve(&(estimate.gradient(number) * *size));
+            let gradient = estimate.gradient(number) * *size;
+            if fault.suspect.quantity().is_none() {
+                by_motion += gradient;
+                continue;
+            }
+            changes.push(fault.clone());
+            match events
+                .iter_mut()
+                .find(|(others, ..)| is_one_event(others[0], fault))
+            {
+                Some((others, largest, sum)) => {
+                    others.push(fault);
+                    *sum += gradient;
+                    *largest = if size.abs() > largest.abs() {
+                        *size
+                    } else {
+                        *largest
+                    };
+                }
+                None => events.push((vec![fault], *size, gradient)),
+            }
+        }
+        for (faults, size, gradient) in events {
+            let fault = faults[0];
+            let Some(quantity) = fault.suspect.quantity() else {
+                continue;
+            };
+            let off = bent.solve(&gradient);
             let (known, off) = (DMatrix::zeros(COUNT, COUNT), &off.as_slice()[..COUNT]);
             let cost = Predicted::new(declared, &known, off).worst_ratio();
             if is_felt(cost) {
                 is_worth_it = true;
-                // A gain of the reference, or a fault that may be another channel's, does not show the stage.
-                let suspect = fault.suspect;
-                let is_laser = suspect.quantity == Quantity::Gain && suspect.is_beam();
-                is_clear &= fault.alike.is_empty() && !is_laser;
-                channels.push(suspect.channel());
-            }
-            if let Some(probe) = fault.suspect.late_probe() {
-                probe_lags_s[probe] += 1e-3 * size;
+                // What may be a change of the reference does not show the stage as it ends.
+                let is_laser = quantity == Quantity::Gain && fault.suspect.is_beam();
+                let mut others = faults.iter().flat_map(|fault| &fault.alike);
+                is_clear &= !is_laser && !others.any(|other| other.is_beam());
+                channels.extend(faults.iter().map(|fault| fault.suspect.channel()));
             }
             // The lag of a beam that was taken off because of another fault comes back.
             let back = (0..3).find(|&beam| {
-                (fault.suspect, fault.shape.onset()) == (Suspect::late(beam), None)
+                (fault.suspect, fault.shape.onset()) == (Suspect::late(3 + beam), None)
                     && self.is_lag(off_middle(self.lags_s)[beam])
             });
             if let Some(beam) = back {
                 lags_s[beam] += 1e-3 * size;
             } else if cost >= COST_MIN {
                 // A robust fit may have rejected the rows that would have cost more.
-                findings.push(self.finding(fault, *size, cost.min(own_cost)));
+                findings.push(self.change(quantity, &faults, size, cost.min(own_cost)));
             }
         }
         let count = |of: Channel| channels.iter().filter(|other| **other == of).count();
         is_clear &= channels.iter().all(|of| count(*of) <= REPAIRS_MAX);
         if let Some((fault, late_ms)) = self.late_beam(lags_s) {
             // The lag is part of all that bent the fit.
-            findings.insert(0, self.finding(&fault, late_ms, own_cost));
+            findings.insert(0, self.change(Quantity::Time, &[&fault], late_ms, own_cost));
         }
-        let covariance = estimate.covariance() * inflation;
-        let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
-        // Other models lack terms, and are not for service.
-        let unexplained = match self.calibrated.is_for_service {
-            true => Some(Unexplained::new(self, (faults, estimate), declared, &off)?),
-            false => None,
+        // An error that follows the motion is never taken off.
+        let refitted = match changes.len() {
+            all if all == faults.len() => None,
+            0 => None,
+            _ => Some(self.refitted(faultless, &changes)?),
         };
-        if let Some(more) = &unexplained {
-            probe_lags_s = more.probe_lags_s;
-        }
-        let [predicted, expected] = match &unexplained {
-            Some(more) => [
-                predicted.with_added(more.added),
-                expected.with_added(more.after_repair),
-            ],
-            None => [predicted, expected],
-        };
+        let repaired = refitted.as_ref().unwrap_or(match changes.is_empty() {
+            true => faultless,
+            false => estimate,
+        });
+        let left = (repaired.values() - estimate.values()).as_slice()[..COUNT].to_vec();
+        let expected = in_service(Predicted::new(declared, &covariance, &left), &left);
         let is_better = is_worth_it
             && is_clear
             && expected.worst_ratio() <= GOOD_MAX
-            && self.calibrated.model == ModelKind::Field
+            && by.model == ModelKind::Field
             && (self.is_bent || !findings.is_empty());
-        let shows = self.calibrated.shows_acceleration;
-        let motion = MotionFit::new(estimate.values().as_slice(), &covariance, shows);
+        let values = repaired.values();
+        let motion = MotionFit::new(values.as_slice(), &covariance, by.shows_acceleration);
         let middle = |values: [f64; 3]| values[0] - off_middle(values)[0];
-        let lag_s = middle(self.lags_s) + estimate.lag_s();
+        let lag_s = middle(self.lags_s) + repaired.lag_s();
         let repair = Repair {
-            parameters: estimate.parameters,
+            parameters: repaired.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
             // One late probe is no lag of all.
             lag_s: lag_s - middle(motion.dynamics.probe_lag_s),
-            motion: motion.with_other_lags(probe_lags_s),
+            motion: motion.with_other_lags(stays.probe_lags_s),
         };
         let judged = if is_better { &expected } else { &predicted };
-        findings.extend(unexplained.as_ref().and_then(|more| more.finding(judged)));
+        let unexplained = variances(&bent.solve(&by_motion).as_slice()[..COUNT]);
+        let unexplained = [0, 1, 2].map(|axis| slow[axis] + unexplained[axis]);
+        let channel = faults
+            .iter()
+            .find(|fault| fault.suspect.quantity().is_none());
+        if by.is_for_service {
+            findings.extend(unexplained_finding(unexplained, channel, judged));
+        }
         Some(Faults {
             findings,
             predicted: Some(predicted),
-            probe_lags_s: unexplained.is_some().then_some(probe_lags_s),
+            probe_lags_s: (!faults.is_empty()).then_some(stays.probe_lags_s),
             repair: is_better.then_some((repair, expected)),
             residual,
         })
@@ -128,11 +248,35 @@ impl Finder<'_> {
         let late = (0..3).filter(|&beam| self.is_lag(off_s[beam]));
         let beam = late.max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
         let fault = Fault {
-            suspect: Suspect::late(beam),
+            suspect: Suspect::late(3 + beam),
             shape: Shape::From(0, self.means.rows.rows.len()),
             gain: 0.0,
             alike: Vec::new(),
         };
         Some((fault, off_s[beam] * 1e3))
     }
+}
+
+/// Errors that no change explains, where they are felt in service; `predicted` includes them. The fault is the clearest.
+fn unexplained_finding(
+    variances: [f64; 3],
+    fault: Option<&Fault>,
+    predicted: &Predicted,
+) -> Option<Finding> {
+    let ratio = |axis: usize| (1.0 + variances[axis] / predicted.noise(axis).powi(2)).sqrt();
+    let ratio = ratio(0).max(ratio(1)).max(ratio(2));
+    let severity = match predicted.worst_ratio() <= GOOD_MAX {
+        true => Severity::Note,
+        false => severity(ratio).max(Severity::Warn),
+    };
+    let found = Finding::new(Kind::Inconsistent { ratio }).with_severity(severity);
+    let found = Finding {
+        channels: fault
+            .map(|fault| fault.suspect.channel())
+            .into_iter()
+            .collect(),
+        alike: fault.map_or_else(Vec::new, |fault| fault.alike.clone()),
+        ..found.with_cost(ratio)
+    };
+    (ratio >= NOTE_MAX).then_some(found)
 }

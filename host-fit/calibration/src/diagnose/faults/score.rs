@@ -22,125 +22,192 @@ pub(super) struct Fault {
     pub(super) alike: Vec<Channel>,
 }
 
-/// A fault is not tested where the parameters can follow all but this part of its information.
+/// A fault is not tested where the parameters can follow all but this part of its information: the log hardly shows it.
 const SEEN_MIN: f64 = 0.01;
 
 type Columns = SMatrix<f64, WIDTH, 3>;
-
-/// A step of the filter: innovation per error of the reference, error per innovation, and what makes an innovation white.
-pub(super) type Step = [Matrix3<f64>; 3];
-
-pub(super) fn steps(estimate: &Estimate) -> Option<Vec<Step>> {
-    let step = |gain: &Gain| {
-        let of = [gain.by_pose, gain.kalman, gain.factor];
-        let [by_error, kalman, factor] = of.map(|rows| Matrix3::from(rows).transpose());
-        Some([by_error, kalman, factor.try_inverse()?])
-    };
-    estimate.gains.iter().map(step).collect()
-}
 
 /// An estimate, prepared to be scanned for faults.
 pub(super) struct Scan<'a> {
     effects: &'a Effects<'a>,
     estimate: &'a Estimate,
-    /// The rows of the estimate, whitened backwards too.
-    rows: Vec<Columns>,
     steps: Vec<Step>,
+    /// Means where a step is more likely than elsewhere: the starts of movements, and where another channel has one.
+    likely: Vec<usize>,
+    /// A gain below this is chance.
+    undecided: f64,
+}
+
+/// A step of the filter that whitens, for signals of A, B, C.
+struct Step {
+    /// Of the rows of the estimate, whitened backwards too: their products with signals.
+    row: Columns,
+    to_white: Matrix3<f64>,
+    kalman: Matrix3<f64>,
+    /// White signals per error of the reference before the step.
+    seen: Matrix3<f64>,
+    /// The part of that error that stays after the step.
+    stays: Matrix3<f64>,
+    /// Squares of white signals after the step by an error of the reference there.
+    after: Matrix3<f64>,
+}
+
+/// A direction of the signals at a mean, as the scan needs it.
+struct Direction {
+    /// Products with the rows.
+    products: SVector<f64, WIDTH>,
+    /// Its own squares.
+    squares: f64,
+    /// The error of the reference that it makes.
+    error: Vector3<f64>,
+    /// Products with an error of the reference before the step.
+    by_error: Vector3<f64>,
 }
 
 impl<'a> Scan<'a> {
-    pub(super) fn new(effects: &'a Effects, estimate: &'a Estimate) -> Option<Self> {
-        let steps = steps(estimate)?;
-        let mut rows: Vec<Columns> = estimate.rows.iter().map(|row| (*row).into()).collect();
+    /// After these faults, where residuals are `misfit` times noise.
+    pub(super) fn new(
+        effects: &'a Effects,
+        estimate: &'a Estimate,
+        faults: &[Fault],
+        misfit: f64,
+    ) -> Option<Self> {
+        let step = |(gain, row): (&Gain, &super::estimate::Row)| {
+            let of = [gain.by_pose, gain.kalman, gain.factor];
+            let [by_error, kalman, factor] = of.map(|rows| Matrix3::from(rows).transpose());
+            let to_white = factor.try_inverse()?;
+            let step = Step {
+                row: (*row).into(),
+                to_white,
+                kalman,
+                seen: to_white * by_error,
+                stays: Matrix3::identity() - kalman * by_error,
+                after: Matrix3::zeros(),
+            };
+            Some((by_error, step))
+        };
+        let steps = estimate.gains.iter().zip(&estimate.rows).map(step);
+        let (by_error, mut steps): (Vec<_>, Vec<_>) =
+            steps.collect::<Option<Vec<_>>>()?.into_iter().unzip();
         for movement in &effects.means.rows.movements {
-            let mut error = Columns::zeros();
+            let (mut error, mut after) = (Columns::zeros(), Matrix3::zeros());
             for at in movement.clone().rev() {
-                let [by_error, kalman, to_white] = &steps[at];
-                rows[at] = rows[at] * to_white + error * kalman;
-                error -= rows[at] * by_error;
+                let step = &mut steps[at];
+                step.row = step.row * step.to_white + error * step.kalman;
+                error -= step.row * by_error[at];
+                step.after = after;
+                after = step.seen.tr_mul(&step.seen) + step.stays.tr_mul(&(after * step.stays));
             }
         }
+        // Things change together, or between movements.
+        let starts = effects.means.rows.movements.iter().map(|m| m.start);
+        let known = faults.iter().filter_map(|fault| fault.shape.onset());
         Some(Self {
             effects,
             estimate,
-            rows,
             steps,
+            likely: starts.chain(known).collect(),
+            undecided: UNDECIDED * misfit,
         })
     }
 
     /// The best shapes of each suspect.
-    pub(super) fn faults(&self) -> Vec<Fault> {
-        let suspects: Vec<Suspect> = suspects().collect();
-        let faults = suspects
-            .into_par_iter()
-            .flat_map_iter(|suspect| self.faults_of(suspect));
+    pub(super) fn faults(&self, with_motion: bool) -> Vec<Fault> {
+        let suspects: Vec<Suspect> = suspects(with_motion).collect();
+        let share_direction =
+            |a: &Suspect, b: &Suspect| a.is_single() && a.channels() == b.channels();
+        let groups: Vec<&[Suspect]> = suspects.chunk_by(share_direction).collect();
+        let faults = groups.into_par_iter().flat_map_iter(|group| {
+            let count = self.steps.len();
+            let directions: Vec<Direction> = (0..count)
+                .map(|at| self.direction(at, self.effects.direction(group[0], at)))
+                .collect();
+            let found = group
+                .iter()
+                .flat_map(|suspect| self.faults_of(*suspect, &directions));
+            found.collect::<Vec<_>>()
+        });
         faults.collect()
     }
 
-    fn faults_of(&self, suspect: Suspect) -> impl Iterator<Item = Fault> {
-        let all = 0..self.effects.means.rows.rows.len();
-        let raw = self.effects.constant(suspect);
+    fn direction(&self, at: usize, signals: Vector3<f64>) -> Direction {
+        let step = &self.steps[at];
+        let (white, error) = (step.to_white * signals, step.kalman * signals);
+        let after = step.after * error;
+        Direction {
+            products: step.row * signals,
+            squares: white.norm_squared() + error.dot(&after),
+            error,
+            by_error: step.seen.tr_mul(&white) - step.stays.tr_mul(&after),
+        }
+    }
+
+    fn faults_of(&self, suspect: Suspect, directions: &[Direction]) -> Vec<Fault> {
+        let all = 0..self.steps.len();
+        let units = self.effects.units(suspect);
         let whole = |shape| {
-            let column = self.effects.shaped(suspect, shape);
-            let found = self.scan(&column, &all, |at| at == 0);
+            let shares = self.effects.shares(suspect, shape);
+            let sizes: Vec<f64> = units.iter().zip(shares).map(|(a, b)| a * b).collect();
+            let found = self.scan((directions, &sizes), &all, |at| at == 0);
             found.first().map(|(_, gain)| (shape, *gain))
         };
+        let onset = |ranges: &[Range<usize>]| self.onset((directions, &units), ranges);
         let mut found = Vec::new();
-        if suspect.quantity == Quantity::Time {
+        let is_time = suspect.quantity() == Some(Quantity::Time);
+        if is_time || suspect.quantity().is_none() {
             found.push(whole(Shape::From(0, all.end)));
         }
         // Channels of a kind have one clock.
-        if suspect.quantity != Quantity::Time || !suspect.is_single() {
+        if suspect.quantity().is_some() && !(is_time && suspect.is_single()) {
             found.push(whole(Shape::Ramp));
         }
         if suspect.can_stay() {
-            found.push(self.onset(&raw, std::slice::from_ref(&all)));
+            found.push(whole(Shape::Arc));
+            found.push(onset(std::slice::from_ref(&all)));
         }
         if suspect.ends_with_movement() {
             found.push(whole(Shape::RampInMovements));
-            found.push(self.onset(&raw, &self.effects.means.rows.movements));
+            found.push(onset(&self.effects.means.rows.movements));
         }
-        let fault = move |(shape, gain)| Fault {
+        let fault = |(shape, gain)| Fault {
             suspect,
             shape,
             gain,
             alike: Vec::new(),
         };
-        found.into_iter().flatten().map(fault)
+        found.into_iter().flatten().map(fault).collect()
     }
 
     /// The onset that explains most: a fault from there on to the end of its range.
-    fn onset(&self, raw: &[[f64; 3]], ranges: &[Range<usize>]) -> Option<(Shape, f64)> {
+    fn onset(
+        &self,
+        column: (&[Direction], &[f64]),
+        ranges: &[Range<usize>],
+    ) -> Option<(Shape, f64)> {
         // First means far apart, then all means near the best. Half the square root of their number apart, because a
         // step near the end of a movement shows only for a moment.
-        let apart = (raw.len().isqrt() / 2).max(1);
+        let apart = (self.steps.len().isqrt() / 2).max(1);
         let coarse = ranges.iter().filter_map(|range| {
             let wanted = |at: usize| at > range.start && (at - range.start).is_multiple_of(apart);
-            Some((largest(self.scan(raw, range, wanted))?, range))
+            Some((largest(self.scan(column, range, wanted))?, range))
         });
         let ((around, _), range) = coarse.max_by(|(a, _), (b, _)| a.1.total_cmp(&b.1))?;
         let wanted = |at: usize| at > range.start && at.abs_diff(around) < apart;
-        let fine = self.scan(raw, range, wanted);
-        // Things change between movements rather than within them.
-        let is_start = |at: usize| {
-            self.effects
-                .means
-                .rows
-                .movements
-                .iter()
-                .any(|m| m.start == at)
-        };
-        let between = largest(fine.iter().copied().filter(|(at, _)| is_start(*at)));
-        let best = largest(fine)?;
-        let between = between.filter(|(_, gain)| *gain > best.1 - UNDECIDED);
-        let (from, gain) = between.unwrap_or(best);
+        let fine = self.scan(column, range, wanted);
+        let likely = fine
+            .iter()
+            .copied()
+            .filter(|(at, _)| self.likely.contains(at));
+        let (likely, best) = (largest(likely), largest(fine.clone())?);
+        let likely = likely.filter(|(_, gain)| *gain > best.1 - self.undecided);
+        let (from, gain) = likely.unwrap_or(best);
         Some((Shape::From(from, range.end), gain))
     }
 
-    /// The gains of a column that begins at each wanted mean and ends with a range of whole movements.
+    /// The gains of a fault that begins at each wanted mean and ends with a range of whole movements.
     fn scan(
         &self,
-        raw: &[[f64; 3]],
+        (directions, sizes): (&[Direction], &[f64]),
         range: &Range<usize>,
         wanted: impl Fn(usize) -> bool,
     ) -> Vec<(usize, f64)> {
@@ -149,16 +216,13 @@ impl<'a> Scan<'a> {
         let mut products = SVector::<f64, WIDTH>::zeros();
         let mut squares = 0.0;
         for movement in movements.filter(|m| range.contains(&m.start)) {
-            // An error e of the reference up to here adds e' `own` e - 2 `by` e to the squares of the rest.
-            let (mut own, mut by) = (Matrix3::zeros(), Vector3::zeros());
+            // Products of the rest of the movement with an error of the reference up to here.
+            let mut by = Vector3::zeros();
             for at in movement.clone().rev() {
-                let ([by_error, kalman, to_white], x) = (&self.steps[at], Vector3::from(raw[at]));
-                let (white, error) = (to_white * x, kalman * x);
-                let (seen, stays) = (to_white * by_error, Matrix3::identity() - kalman * by_error);
-                products += self.rows[at] * x;
-                squares += white.norm_squared() + error.dot(&(own * error)) - 2.0 * by.dot(&error);
-                by = seen.tr_mul(&white) + stays.tr_mul(&(by - own * error));
-                own = seen.tr_mul(&seen) + stays.tr_mul(&(own * stays));
+                let (direction, size) = (&directions[at], sizes[at]);
+                products.axpy(size, &direction.products, 1.0);
+                squares += size * (size * direction.squares - 2.0 * by.dot(&direction.error));
+                by = direction.by_error * size + self.steps[at].stays.tr_mul(&by);
                 if wanted(at)
                     && let Some(gain) = self.gain(&products, squares)
                 {
