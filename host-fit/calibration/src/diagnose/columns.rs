@@ -21,10 +21,9 @@ const BENDS: f64 = 0.75;
 
 /// The effect of a fault.
 enum Effect {
-    /// A probe or a gap has an error with this variance in service, m2.
-    Variance(f64),
-    /// The same, and it is in the covariance of the channels already.
-    Counted(f64),
+    /// A probe or a gap has an error in service: its variance, m2, and the part of it that is in the covariance of the
+    /// channels already.
+    Stays(f64, f64),
     /// The reference has an error that follows the motion, rms m.
     Bent(f64),
     /// Its size is not known, or there is none in service.
@@ -76,9 +75,7 @@ impl ColumnFaults {
                     let with_effect = |(kind, effect): (Kind, Effect)| {
                         let found = Finding::new(kind).with_channel(column.channel);
                         let own = match effect {
-                            Effect::Variance(m2) | Effect::Counted(m2) => {
-                                effects.variances(&[column.channel], |_, _| m2)
-                            }
+                            Effect::Stays(m2, _) => effects.variances(&[column.channel], |_, _| m2),
                             Effect::Bent(m) => floor.map(|of| of * (BENDS * m / noise_m).powi(2)),
                             Effect::Unknown => return (found, effect, [0.0; 3]),
                         };
@@ -111,10 +108,13 @@ impl ColumnFaults {
                         None => found,
                     });
                     match effect {
-                        Effect::Variance(_) => add(&mut stays, own),
+                        Effect::Stays(m2, counted_m2) => {
+                            let part = 1.0 - counted_m2 / m2;
+                            add(&mut stays, own.map(|own| own * part));
+                        }
                         // The beams are slow together.
                         Effect::Bent(_) => most(&mut out.bent, own),
-                        Effect::Counted(_) | Effect::Unknown => {}
+                        Effect::Unknown => {}
                     }
                 }
                 let channels: Vec<Channel> = kind.iter().map(|column| column.channel).collect();
@@ -215,7 +215,7 @@ fn faults(
     };
     let is_stuck = !column.stuck_bits.is_empty();
     // Half of the values are off by the bit.
-    let stuck_m2 = bits_m.map(|bit_m| 0.25 * bit_m * bit_m).sum();
+    let stuck_m2: f64 = bits_m.map(|bit_m| 0.25 * bit_m * bit_m).sum();
     let slow = |slow: SlowRate| Kind::SlowRate {
         rows: slow.every,
         is_held: slow.is_held,
@@ -227,15 +227,20 @@ fn faults(
     let noisy = |ratio: f64| {
         let noise_um = 1e6 * noise_m;
         let beyond_m2 = noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio));
-        (Kind::Noisy { noise_um, ratio }, Effect::Variance(beyond_m2))
+        (
+            Kind::Noisy { noise_um, ratio },
+            Effect::Stays(beyond_m2, 0.0),
+        )
     };
     let own_m2 = column.beyond_m2[column.channel as usize % 3];
     let line_m2 = column
         .line
         .map_or(0.0, |line| 0.5 * line.amplitude_m * line.amplitude_m);
+    // The steps of a bit are fast noise, too.
+    let of_bits = Effect::Stays(stuck_m2, own_m2.clamp(0.0, stuck_m2));
     let in_service = |m2: f64| match is_beam {
         true => Effect::Unknown,
-        false => Effect::Counted(m2.max(0.0)),
+        false => Effect::Stays(m2.max(f64::MIN_POSITIVE), m2.max(f64::MIN_POSITIVE)),
     };
     let hum = column.line.map(|line| Kind::Hum {
         frequency_hz: line.frequency_hz,
@@ -254,7 +259,7 @@ fn faults(
     let filled = filled.filter(|&filled| share(filled) > Severity::Note);
     let of_steps = match is_beam {
         true => Effect::Unknown,
-        false => Effect::Variance(rounding_m2),
+        false => Effect::Stays(rounding_m2, 0.0),
     };
     let of_rate = |slow: SlowRate| match is_beam {
         true => Effect::Bent(slow.error_m),
@@ -263,7 +268,7 @@ fn faults(
     let faults = [
         column.overflows.map(overflow),
         is_coarse.then_some((steps, of_steps)),
-        is_stuck.then_some((stuck, Effect::Variance(stuck_m2))),
+        is_stuck.then_some((stuck, of_bits)),
         column.slow.map(|rate| (slow(rate), of_rate(rate))),
         (column.is_low_passed && column.slow.is_none())
             .then_some((Kind::LowPass {}, Effect::Unknown)),

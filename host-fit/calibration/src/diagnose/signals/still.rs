@@ -79,9 +79,9 @@ pub(super) fn noise_alone(log: &mut LogSignals) -> Vec<Finding> {
         log.columns[channel].is_some() && log.segments.iter().any(|rows| moved_m(rows) > still_m)
     };
     let still: Vec<usize> = (0..9).filter(|&channel| !moves(channel)).collect();
-    let all = |channel: usize| match still == [channel] {
-        true => vec![0..log.rows.len()],
-        false => Vec::new(),
+    let all = |channel: usize| {
+        let is_alone = still == [channel];
+        is_alone.then_some(0..log.rows.len()).into_iter().collect()
     };
     let runs = (0..9).map(all).collect();
     named(log, runs)
