@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::{Coverage, Fallible, RUN_8, RUN_30, Twin};
+use common::{Coverage, Fallible, RUN_8, RUN_30, Twin, field};
 use host_fit::calibration::plan::run::PlannedRun;
 use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped;
@@ -16,15 +16,12 @@ use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, Run};
 use host_fit::simulate::random::{Purpose, Stream};
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solver::estimator::field::{FieldFit, fit_field};
-use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::field::FieldFit;
 use host_fit::solver::estimator::paper::Parameters;
 use host_fit::solver::estimator::parameters::FieldParameters;
 use host_fit::solver::estimator::probe::probes;
-use host_fit::solver::estimator::problem::Problem;
 use host_fit::solver::estimator::terms::TERMS;
-use host_fit::solver::solve::{Projection, Solver, SolverOptions};
-use runtime::{ModelKind, RawFrame, VerticalPose};
+use runtime::{RawFrame, VerticalPose};
 
 const PERIOD_S: f64 = 0.002;
 /// One pose in this number of rows of a service log is judged.
@@ -94,15 +91,6 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
     }
     dataset.end_log("made");
     dataset
-}
-
-/// The field model, started from Model (31). (Logs made by the field model have no codes to judge.)
-fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
-    let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(dataset, &all, stage, Model::from_kind(ModelKind::M31));
-    let options = SolverOptions::new(Projection::Linear, 1);
-    let start = Solver::LeastSquares.solve(&problem, &options)?.parameters;
-    Ok(fit_field(dataset, &all, stage, &start)?)
 }
 
 /// Parameters fitted to logs made by the field model.

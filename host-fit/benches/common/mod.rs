@@ -12,7 +12,10 @@ use host_fit::simulate::protocol::Run;
 use host_fit::simulate::recording::{Recording, record, record_in};
 use host_fit::simulate::sensors::SensorErrors;
 use host_fit::simulate::thermal::{Climate, Thermal};
+use host_fit::solver::estimator::field::{FieldFit, fit_field};
 use host_fit::solver::estimator::model::Model;
+use host_fit::solver::estimator::problem::Problem;
+use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, ParameterSet};
 use std::error::Error;
 use std::time::Instant;
@@ -89,6 +92,15 @@ pub fn dataset(recording: &Recording, stage: &Stage) -> Dataset {
 pub fn fitted(dataset: &Dataset, stage: &Stage, kind: ModelKind) -> Fallible<Fit> {
     let model = ModelChoice::Named(Model::from_kind(kind));
     Ok(fit(dataset, stage, &FitSettings::new(model))?)
+}
+
+/// The field model, started from Model (31). (Logs made by the field model have no codes to judge.)
+pub fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let problem = Problem::new(dataset, &all, stage, Model::from_kind(ModelKind::M31));
+    let options = SolverOptions::new(Projection::Linear, 1);
+    let start = Solver::LeastSquares.solve(&problem, &options)?.parameters;
+    Ok(fit_field(dataset, &all, stage, &start)?)
 }
 
 /// rms errors of the decoded poses of a log, m, m, rad; the reference of the log is the truth.

@@ -38,7 +38,8 @@ fn main() {
         let found = (1..=FAULTY).map(|seed| {
             let mut recording = recording(&stage, &planned, 1000 + seed);
             recording.movements.iter_mut().flatten().for_each(mistake);
-            let mut found = structure(&dataset(&recording, &stage), &stage, false).into_iter();
+            let mut found =
+                structure(&dataset(&recording, &stage), &stage, false, None).into_iter();
             found.any(|finding| finding.code() == code)
         });
         let named = found.filter(|is_named| *is_named).count();

@@ -1,6 +1,7 @@
 //! Fits, judges, plans and diagnoses the calibration of a Hall-sensor array.
 #![forbid(unsafe_code)]
 
+pub mod budget;
 pub mod diagnose;
 pub mod fit;
 pub mod judge;

@@ -27,6 +27,7 @@ mod described;
 
 use described::check_described;
 
+use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::{Fit, RANGE_MARGIN, calibration};
@@ -68,6 +69,8 @@ pub struct StoredPosterior {
     /// The faults of the log that the calibration is without, in words: see
     /// [`Repair`](crate::fit::Repair).
     pub repaired: Vec<String>,
+    /// The uncertainty in service, source by source.
+    pub budget: Option<Budget>,
 }
 
 impl StoredPosterior {
@@ -83,6 +86,7 @@ impl StoredPosterior {
             },
             misfit: score.chi_squared / score.residuals.max(1) as f64,
             repaired: Vec::new(),
+            budget: None,
         })
     }
 }
@@ -249,8 +253,15 @@ pub fn recalibrate(
     let (white_m, covariance) = (update.noise.white_m, &update.posterior.covariance);
     let validity =
         known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
+    let temperature = set.constants.temperature.rounded();
+    let of_posterior = (&update.parameters, &update.posterior);
+    let budget = predicted
+        .as_ref()
+        .filter(|_| known.is_some())
+        .and_then(|of| Budget::new(stage, of_posterior, &temperature, of, update.residuals));
     let diagnosis = Diagnosis {
         validity,
+        budget,
         ..diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted))
     };
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
@@ -270,6 +281,7 @@ pub fn recalibrate(
             noise: update.noise,
             misfit: known.misfit,
             repaired: known.repaired.clone(),
+            budget: diagnosis.budget.clone(),
         }),
         gains,
         after: service.ratios(),

@@ -233,7 +233,10 @@ impl Lines {
                         "correct it for another converter",
                     );
                 }
-                _ if line.is_empty() || line.starts_with(['[', '#']) || table == "motion" => {
+                _ if line.is_empty()
+                    || line.starts_with(['[', '#'])
+                    || matches!(table, "motion" | "uncertainty") =>
+                {
                     let _ = writeln!(self.text, "{line}");
                 }
                 _ => {

@@ -2,6 +2,7 @@
 
 mod air;
 mod beams;
+mod certificate;
 mod columns;
 mod document;
 mod error;
@@ -10,11 +11,14 @@ mod interferometer;
 mod motion;
 mod search;
 mod temperature;
+mod uncertainty;
 
+pub use certificate::{CertificateTable, TEXTS};
 pub use error::{StageError, TextPosition};
 pub use interferometer::Interferometer;
 pub use motion::{AxisMotion, Motion};
 pub use temperature::TemperatureTable;
+pub use uncertainty::{Input, Uncertainty};
 
 use crate::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
@@ -155,6 +159,10 @@ pub struct Stage {
     pub motion: Motion,
     /// Temperatures in a log, and what is known of their effect.
     pub temperature: TemperatureTable,
+    /// Standard uncertainties of the drawing, the reference and the sensors.
+    pub uncertainty: Uncertainty,
+    /// What a certificate says beside the results, and when a calibration conforms.
+    pub certificate: CertificateTable,
     /// Which column of a log holds what.
     pub log: LogLayout,
 }

@@ -20,13 +20,15 @@ use host_fit::calibration::words;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
+use host_fit::report::budget;
 use host_fit::report::errors::{errors, from_rms_and_peak};
+use host_fit::report::page::CERTIFICATE;
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::update::Change;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList};
+use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList};
 use runtime::ParameterSet;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -235,6 +237,21 @@ impl Calibration {
         })
     }
 
+    /// The uncertainty budget as a `pandas.DataFrame`, a row for each source: `u` in `unit`, contributions over service
+    /// (`rms_x_um`, ...), at its ends (`ends_x_um`, ...) and by a unit of the source (`sensitivity_x_um`, ...); then
+    /// `combined`, and the inputs that are not included. None without a budget. Needs pandas.
+    #[getter]
+    fn budget<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let budget = self.known.as_ref().and_then(|known| known.budget.as_ref());
+        let frame = |budget| {
+            let rows = finding::figures(py, &budget::frame(budget))?;
+            let options = [("sep", "_")].into_py_dict(py)?;
+            py.import("pandas")?
+                .call_method("json_normalize", (rows,), Some(&options))
+        };
+        budget.map(frame).transpose()
+    }
+
     /// rms and peak of X, Y, Rz, a dict, um, um, urad: over all rows of the log, zero deviations refitted where
     /// the model has them.
     #[getter]
@@ -346,7 +363,7 @@ impl Calibration {
     ) -> PyResult<()> {
         let (of, _) = self.fit_or_raise("report")?;
         let about = About {
-            title: "Calibration certificate",
+            title: CERTIFICATE,
             serial: &self.set.serial,
             operator,
             notes: notes.unwrap_or_default(),

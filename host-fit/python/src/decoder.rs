@@ -7,7 +7,7 @@ use crate::motion::Commanded;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::{LogReading, ReadOptions};
-use host_fit::output::pose_file::uncertainty;
+use host_fit::output::pose_file::KnownErrors;
 use host_fit::output::{blob_file, posterior_file};
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::parameters::FieldParameters;
@@ -145,11 +145,12 @@ impl Decoder {
     }
 
     /// Standard uncertainty of X, Y, Rz of each row, float64, (n, 3), m, m, rad: by the parameters and by the
-    /// noise of the probes together, at the pose that is decoded; 0 where none is. Arguments as of a call.
+    /// noise of the probes together, at the pose that is decoded; 0 where none is. With `whole` by all sources of the
+    /// budget. Other arguments as of a call.
     ///
     /// Raises `ValueError` without a posterior: of other models than the field model, or where
-    /// `params.bin.posterior` does not stand beside the blob.
-    #[pyo3(signature = (hall, caps, *, mount = None, body = None))]
+    /// `params.bin.posterior` does not stand beside the blob; with `whole` also without a budget in it.
+    #[pyo3(signature = (hall, caps, *, mount = None, body = None, whole = false))]
     fn uncertainty<'py>(
         &self,
         py: Python<'py>,
@@ -157,8 +158,12 @@ impl Decoder {
         caps: &Bound<'py, PyAny>,
         mount: Option<&Bound<'py, PyAny>>,
         body: Option<&Bound<'py, PyAny>>,
+        whole: bool,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let posterior = self.posterior()?;
+        let known = self.known_errors()?;
+        if whole && known.budget.is_none() {
+            return Err(wrong("whole", "the posterior has no budget; fit again"));
+        }
         let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
         let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
         let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
@@ -172,7 +177,8 @@ impl Decoder {
         };
         let words_at = |row: usize| {
             let reading = self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO);
-            uncertainty(&reading, &posterior)
+            let all = known.at(&reading);
+            [0, 1, 2].map(|k| all[if whole { 3 + k } else { k }])
         };
         let found: Vec<[f64; 3]> = work::run(py, || {
             (0..hall.len()).into_par_iter().map(words_at).collect()
@@ -208,7 +214,7 @@ impl Decoder {
 }
 
 impl Decoder {
-    fn posterior(&self) -> PyResult<Posterior> {
+    fn known_errors(&self) -> PyResult<KnownErrors> {
         let parameters = FieldParameters::from_blob(&self.set).ok_or_else(|| {
             let model = Model::from_kind(self.set.model).name;
             wrong(
@@ -223,11 +229,10 @@ impl Decoder {
             )
         })?;
         let covariance = known.covariance.clone();
-        Ok(Posterior::from_covariance(
-            covariance,
-            &parameters,
-            &known.noise,
-        ))
+        Ok(KnownErrors {
+            posterior: Posterior::from_covariance(covariance, &parameters, &known.noise),
+            budget: known.budget.clone(),
+        })
     }
 
     /// The words of all rows of a log.

@@ -23,6 +23,8 @@ use std::path::{Path, PathBuf};
 pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
     let page = Page {
         title: "",
+        number: "",
+        first: Vec::new(),
         verdict: Summary::new(subject),
         facts: Vec::new(),
         causes: Cause::grouped(&subject.diagnosis.findings),
@@ -97,6 +99,7 @@ pub fn write(
         provenance,
         warnings,
         report: Some(report),
+        as_found: None,
     };
     let html = source.html().map_err(internal)?;
     if path.is_dir() {

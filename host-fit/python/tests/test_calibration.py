@@ -121,7 +121,7 @@ def test_an_evaluation_has_the_figures_of_the_program_and_a_page(
     assert str(DATA) not in text
     assert len(v.residuals()) == len(service)
     cal.report(tmp_path / "fit.html", operator="me")
-    assert "Calibration certificate" in (tmp_path / "fit.html").read_text()
+    assert "Calibration report" in (tmp_path / "fit.html").read_text()
 
 
 def test_a_calibration_of_another_stage_is_refused_by_an_evaluation(
@@ -250,3 +250,20 @@ def test_ctrl_c_ends_a_search_that_shows_how_far_it_is_and_the_next_fit_works(
     shown = capsys.readouterr().err
     assert " % " in shown and shown.endswith("\r")
     assert hs.fit(run30).verdict == "good"
+
+
+def test_the_budget_of_a_fit_is_a_frame_also_after_it_is_read_from_its_files(
+    cal: hs.Calibration, tmp_path: Path
+) -> None:
+    pytest.importorskip("pandas")
+    cal.save(tmp_path / "p.bin")
+    read = hs.Calibration.open(tmp_path / "p.bin", hs.Stage.load(DATA / "stage.toml"))
+    frame = read.budget
+    assert frame is not None and cal.budget is not None and frame.equals(cal.budget)
+    assert cal.figures is not None
+    figures = cal.figures["budget"]
+    sources = len(figures["sources"])
+    squares = (frame["rms_x_um"][:sources] ** 2).sum()
+    combined = frame[frame["source"] == "combined"]["rms_x_um"].item()
+    assert np.isclose(combined, figures["combined"]["rms"]["x_um"]) and np.isclose(combined**2, squares)
+    assert list(frame["source"][sources + 1 :]) == [f"not included: {name}" for name in figures["not_included"]]

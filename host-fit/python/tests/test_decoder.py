@@ -84,6 +84,10 @@ def test_uncertainties_are_those_of_the_program_and_cover_the_errors(
     for axis, name in enumerate(["u_x_m", "u_y_m", "u_rz_rad"]):
         # The program knows the drawing, the blob alone does not.
         assert np.allclose(u[:, axis], wanted[name], rtol=1e-4)
+    whole = dec.uncertainty(service.hall, service.caps, whole=True)
+    for axis, name in enumerate(["uc_x_m", "uc_y_m", "uc_rz_rad"]):
+        assert np.allclose(whole[:, axis], wanted[name], rtol=1e-4)
+    assert np.all(whole > u)
     poses = dec(service)
     error = np.stack([poses[name] for name in WORDS[:3]], axis=1) - service.reference
     covered = np.mean(np.abs(error) < 2 * u, axis=0)

@@ -1,5 +1,6 @@
 //! A blob judged on logs with reference.
 
+use super::ErrorLimits;
 use crate::report::errors::{RowErrors, errors};
 use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
@@ -8,7 +9,7 @@ use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob, diagnos
 use hallstage_calibration::fit::{FitSettings, ModelChoice, counted, fit};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
-use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words;
@@ -54,6 +55,7 @@ pub struct Evaluation {
     corrected: Option<PoseError>,
     zeros: Zeros<'static>,
     limit: f64,
+    limits: ErrorLimits,
     /// Why the blob does not do for these logs; `None` if it does.
     pub refusal: Option<Refusal>,
 }
@@ -111,9 +113,11 @@ impl Evaluation {
             let (white_m, covariance) = (known.noise.white_m, &known.covariance);
             Validity::new(stage, &parameters, white_m, covariance)
         });
+        let predicted = diagnosis.predicted.as_ref().filter(|_| is_field(set));
+        let limits = ErrorLimits::default().or(&stage.certificate, predicted);
         let refusal = other
             .or_else(|| Refusal::from_findings(&diagnosis.findings))
-            .or_else(|| beyond_limit(&diagnosis));
+            .or_else(|| limits.refusal(predicted?, diagnosis.verdict));
         if refusal.is_some() {
             diagnosis.verdict = Some(Verdict::Refused);
         }
@@ -129,6 +133,7 @@ impl Evaluation {
             corrected,
             zeros,
             limit,
+            limits,
         })
     }
 
@@ -177,7 +182,7 @@ impl Evaluation {
             diagnosis: &self.diagnosis,
             is_field: is_field(&self.set),
             errors: Some(&self.judgement.errors),
-            limits: if in_service { [None; 3] } else { on_log },
+            limits: if in_service { self.limits.0 } else { on_log },
             corrected: self.corrected.as_ref(),
             in_service,
         }
@@ -209,22 +214,6 @@ fn faults_of(dataset: &Dataset, stage: &Stage) -> Diagnosis {
         columns,
         ..Diagnosis::default()
     }
-}
-
-/// The refusal of a blob with errors in service that no finding explains.
-fn beyond_limit(diagnosis: &Diagnosis) -> Option<Refusal> {
-    let predicted = diagnosis.predicted.as_ref()?;
-    let beyond = |(k, axis): (usize, &'static Axis)| Beyond {
-        axis,
-        rms: predicted.rms[k],
-        limit: LIMITED_MAX * predicted.noise(k),
-    };
-    let errors = PLANAR.iter().enumerate().map(beyond);
-    let errors = errors.filter(|error| error.rms > error.limit).collect();
-    (diagnosis.verdict == Some(Verdict::Refused)).then_some(Refusal::BeyondLimit {
-        errors,
-        is_in_service: true,
-    })
 }
 
 fn is_field(set: &ParameterSet) -> bool {

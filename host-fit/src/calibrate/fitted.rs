@@ -107,6 +107,9 @@ impl FitOrder {
         if let Some(motion) = &diagnosis.motion {
             fitted = fitted.map(|fit| fit.with_motion(&motion.fit));
         }
+        let is_field = fitted.as_ref().is_ok_and(|fit| fit.field.is_some());
+        let predicted = diagnosis.predicted.as_ref().filter(|_| is_field);
+        let limits = self.limits.or(&stage.certificate, predicted);
         let mut outcome = JudgedFit {
             fitted,
             diagnosis,
@@ -114,7 +117,7 @@ impl FitOrder {
             has_blob: false,
             is_interrupted,
             is_kept: self.is_kept,
-            limits: self.limits,
+            limits,
         };
         let refusal = match &outcome.fitted {
             Err(error) => Some(Refusal::no_fit(error, &outcome.diagnosis.findings)),
@@ -179,6 +182,7 @@ impl JudgedFit {
         let known = StoredPosterior::from_fit(self.fitted.as_ref().ok()?)?;
         Some(StoredPosterior {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
+            budget: self.diagnosis.budget.clone(),
             ..known
         })
     }

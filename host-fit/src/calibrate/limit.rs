@@ -1,8 +1,11 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
-use hallstage_calibration::diagnose::refusal::Beyond;
+use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
+use hallstage_calibration::judge::predicted::Predicted;
+use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
 use hallstage_input::axis::PLANAR;
 use hallstage_input::log::layout::Dimension;
+use hallstage_input::stage::CertificateTable;
 use std::str::FromStr;
 
 /// The kinds of units of X, Y, Rz.
@@ -40,6 +43,29 @@ impl FromStr for ErrorLimits {
 }
 
 impl ErrorLimits {
+    /// These, else those of the certificate; guarded ones less what the rms error may be larger than predicted.
+    #[must_use]
+    pub fn or(self, table: &CertificateTable, predicted: Option<&Predicted>) -> Self {
+        Self([0, 1, 2].map(|k| {
+            let limit = self.0[k].or(table.limits[k])?;
+            let guarded = predicted.filter(|_| table.is_guarded);
+            let guard = guarded.map_or(0.0, |of| of.range[k][1] - of.rms[k]);
+            Some(limit - guard)
+        }))
+    }
+
+    /// The refusal of errors in service beyond these limits; where the verdict refuses, also beyond the usual ones.
+    pub fn refusal(&self, predicted: &Predicted, verdict: Option<Verdict>) -> Option<Refusal> {
+        let is_refused = verdict == Some(Verdict::Refused);
+        let usual = |k: usize| is_refused.then_some(LIMITED_MAX * predicted.noise(k));
+        let limit = |k: usize| self.0[k].into_iter().chain(usual(k)).reduce(f64::min);
+        let errors = Self([0, 1, 2].map(limit)).exceeded(predicted.rms);
+        (!errors.is_empty()).then_some(Refusal::BeyondLimit {
+            errors,
+            is_in_service: true,
+        })
+    }
+
     /// The rms errors (m, m, rad) that are beyond their limits.
     pub fn exceeded(&self, rms: [f64; 3]) -> Vec<Beyond> {
         let beyond = |axis: usize| {
@@ -77,5 +103,41 @@ mod tests {
         ] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_guarded_limit_is_less_what_the_error_may_be_larger_than_predicted() {
+        let predicted = Predicted {
+            rms: [1e-6; 3],
+            ratio: [1.0; 3],
+            range: [[0.9e-6, 1.2e-6]; 3],
+        };
+        let mut table = CertificateTable {
+            limits: [Some(1.1e-6), None, Some(1.25e-6)],
+            ..CertificateTable::default()
+        };
+        let given = ErrorLimits([None, Some(1.5e-6), None]);
+        let refused = |table: &CertificateTable| {
+            let limits = given.or(table, Some(&predicted));
+            let refusal = limits.refusal(&predicted, Some(Verdict::Good));
+            refusal.map(|refusal| match refusal {
+                Refusal::BeyondLimit { errors, .. } => errors.iter().map(|e| e.axis.key).collect(),
+                _ => Vec::new(),
+            })
+        };
+        assert_eq!(refused(&table), None);
+        table.is_guarded = true;
+        assert_eq!(refused(&table), Some(vec!["x"]));
+        // The usual limit, 1.30 times the noise: a sensor that stays late does not refuse.
+        let poor = Predicted {
+            ratio: [1.4; 3],
+            ..predicted
+        };
+        let usual = |verdict| {
+            ErrorLimits::default()
+                .refusal(&poor, Some(verdict))
+                .is_some()
+        };
+        assert!(usual(Verdict::Refused) && !usual(Verdict::Limited));
     }
 }

@@ -1,15 +1,20 @@
 //! What is said of a calibration that was brought up to date.
 
-use super::name_of;
+use super::{ErrorLimits, name_of};
 use crate::report::errors::{errors, pose};
-use crate::report::figure::{Group, figure, group};
+use crate::report::figure::{Group, figure, group, micro};
+use crate::report::page::AsFound;
+use crate::report::result::{Judged, Report};
+use crate::report::table::Table;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
+use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_calibration::recalibrate::{
     RecalibrateError, Recalibration, StoredPosterior, recalibrate,
 };
 use hallstage_calibration::words;
+use hallstage_input::axis::PLANAR;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::update::Change;
@@ -26,8 +31,10 @@ pub struct Updated {
     pub warnings: Vec<String>,
     /// The figures.
     pub figures: Group,
-    /// Why it is no good, where the log says so.
+    /// Why it is no good.
     pub refusal: Option<Refusal>,
+    /// Largest rms errors in service.
+    limits: ErrorLimits,
 }
 
 impl Updated {
@@ -44,9 +51,13 @@ impl Updated {
     ) -> Result<Self, RecalibrateError> {
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
+        let predicted = new.diagnosis.predicted.as_ref();
+        let limits = ErrorLimits::default().or(&stage.certificate, predicted);
+        let refusal = Refusal::from_findings(&new.diagnosis.findings);
         Ok(Self {
             figures: figures(change, &new, log, &warnings),
-            refusal: Refusal::from_findings(&new.diagnosis.findings),
+            refusal: refusal.or_else(|| limits.refusal(predicted?, new.diagnosis.verdict)),
+            limits,
             new,
             warnings,
         })
@@ -58,6 +69,54 @@ impl Updated {
         Some(words::refusal(refusal, &self.new.diagnosis.findings))
     }
 
+    /// The figures of a page, and those of the old blob.
+    pub fn report(&self, old: &ParameterSet, log: &LogReading, stage: &Stage) -> (Report, AsFound) {
+        let (new, dataset) = (&self.new, &log.dataset);
+        let by_row = |set: &ParameterSet, judgement: &Judgement| {
+            Decoded::new(set, dataset).errors_less(&judgement.zeros, dataset)
+        };
+        let mut report = Report::from_judgement(Judged {
+            set: &new.set,
+            judgement: &new.judgement,
+            zeros: Zeros::Refit,
+            by_row: by_row(&new.set, &new.judgement),
+            over_rows: new.judgement.errors,
+            stage,
+            dataset,
+            skipped_rows: log.skipped_rows,
+            elapsed_s: 0.0,
+            warnings: self.warnings.clone(),
+            diagnosis: &new.diagnosis,
+            refusal: self.refusal.as_ref(),
+        });
+        report.figures = self.figures.clone();
+        let in_service = |ratios: [f64; 3]| [0, 1, 2].map(|k| ratios[k] * new.floor[k]);
+        let mut table = Table {
+            decimals: Some(2),
+            ..Table::new(
+                "As found and as left",
+                &["rms on the log", "rms in service"],
+            )
+        };
+        for (state, judgement, ratios) in [
+            ("as found", &new.judgement_before, new.before),
+            ("as left", &new.judgement, new.after),
+        ] {
+            for (k, axis) in PLANAR.iter().enumerate() {
+                let errors = [judgement.errors.axes[k].rms, in_service(ratios)[k]];
+                let name = format!("{}, {state}", axis.name);
+                table.row(name, errors.map(|error| micro(axis, error)));
+            }
+        }
+        let before = &new.judgement_before;
+        let as_found = AsFound {
+            by_row: by_row(old, before),
+            errors: before.errors,
+            table,
+        };
+        (report, as_found)
+    }
+
     /// What its verdict is about.
     pub fn subject(&self) -> Subject<'_> {
         Subject {
@@ -65,7 +124,7 @@ impl Updated {
             diagnosis: &self.new.diagnosis,
             is_field: true,
             errors: Some(&self.new.judgement.errors),
-            limits: [None; 3],
+            limits: self.limits.0,
             corrected: None,
             in_service: true,
         }

@@ -4,7 +4,7 @@ use super::arguments::{StageFile, choice, hold};
 use super::interrupt;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
+use crate::output::pose_file::{self, DecodeSettings, KnownErrors, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
 use crate::output::{Output, kept};
 use clap::Args;
@@ -33,8 +33,8 @@ pub(super) struct DecodeArgs {
     /// Repeat the last valid pose for at most N rows where codes are bad.
     #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
     hold: OnInvalid,
-    /// Add the standard uncertainty of X, Y, Rz to each line, by parameters and noise: three
-    /// columns. For a blob of the field model with its posterior beside it.
+    /// Add the standard uncertainty of X, Y, Rz to each line, by parameters and noise, and by all sources of the
+    /// budget: six columns. For a blob of the field model with its posterior beside it.
     #[arg(long)]
     uncertainty: bool,
     /// How poses are written.
@@ -53,8 +53,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         kept::check_own(&args.out, kept::POSES)?;
     }
     let (set, stage) = super::blob_of_stage(&args.params, &args.stage)?;
-    let known = || posterior(&set, &stage, &args.params);
-    let posterior = args.uncertainty.then(known).transpose()?;
+    let known = || known_errors(&set, &stage, &args.params);
+    let known = args.uncertainty.then(known).transpose()?;
     let out = Output::create(&args.out)?;
     if args.format == PoseFormat::Npy && !out.is_file() {
         return Err(HostError::usage(
@@ -67,7 +67,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         decoder: &set.decoder(),
         on_invalid: args.hold,
         correction: set.motion_correction.as_ref(),
-        posterior: posterior.as_ref(),
+        known: known.as_ref(),
         format: args.format,
         watch: interrupt::watch(),
     };
@@ -93,7 +93,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
 }
 
 /// What is known of a blob's errors, from the file beside it.
-fn posterior(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<Posterior, HostError> {
+fn known_errors(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<KnownErrors, HostError> {
     let parameters = FieldParameters::from_set(set, stage);
     let parameters = parameters.ok_or_else(|| {
         HostError::input(format!(
@@ -107,9 +107,8 @@ fn posterior(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<Posterior
     let known = known.ok_or_else(|| PosteriorFileError::Missing {
         blob: blob.to_owned(),
     })?;
-    Ok(Posterior::from_covariance(
-        known.covariance,
-        &parameters,
-        &known.noise,
-    ))
+    Ok(KnownErrors {
+        posterior: Posterior::from_covariance(known.covariance, &parameters, &known.noise),
+        budget: known.budget,
+    })
 }

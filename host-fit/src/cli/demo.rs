@@ -164,7 +164,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
         correction: None,
         decoder: &model_31.set.decoder(),
         on_invalid: OnInvalid::Zero,
-        posterior: None,
+        known: None,
         format: PoseFormat::Csv,
         watch: interrupt::WATCH,
     };

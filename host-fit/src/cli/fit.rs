@@ -9,6 +9,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, kept, posterior_file};
 use crate::report::channels::channels;
+use crate::report::page::CERTIFICATE;
 use crate::report::parameters;
 use crate::report::table::Table;
 use crate::report::text::as_text;
@@ -50,7 +51,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let created = args.report.created.clone().unwrap_or_default();
     let order = args.options.order(created, interrupt::watch());
     let job = Job {
-        title: "Calibration certificate",
+        title: CERTIFICATE,
         order: order.map_err(HostError::from_mismatch)?,
         out: Some(&args.out),
     };

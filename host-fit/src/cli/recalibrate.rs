@@ -1,18 +1,18 @@
 //! `host-fit recalibrate`.
 
 use super::arguments::{Json, Logs, choice};
-use super::report::finish;
+use super::report::{ReportArgs, finish};
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
-use crate::output::{Outputs, posterior_file};
+use crate::output::{Outputs, blob_file, posterior_file};
+use crate::report::page::CERTIFICATE;
 use clap::Args;
 use hallstage_calibration::recalibrate::RecalibrateError;
 use hallstage_input::log::ReadOptions;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::update::Change;
 use runtime::ModelKind;
-use runtime::parameters::Text;
 use std::path::PathBuf;
 
 /// Arguments of `recalibrate`.
@@ -29,9 +29,8 @@ pub(super) struct RecalibrateArgs {
     /// Where to write the new blob.
     #[arg(long, value_name = "new.bin")]
     out: PathBuf,
-    /// Creation time, for the blob, as you want it to read; at most 32 bytes.
-    #[arg(long, value_name = "TIME", value_parser = super::arguments::blob_text)]
-    created: Option<Text>,
+    #[command(flatten)]
+    report: ReportArgs,
     #[command(flatten)]
     json: Json,
 }
@@ -48,7 +47,11 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         new_posterior.as_deref(),
         args.json.path.as_deref(),
     ];
-    super::check_outputs(outputs, None, inputs.chain(old_posterior.as_deref()))?;
+    super::check_outputs(
+        outputs,
+        Some(&args.report),
+        inputs.chain(old_posterior.as_deref()),
+    )?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     if old.model != ModelKind::Field {
         let model = Model::from_kind(old.model).title();
@@ -64,13 +67,31 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         ..ReadOptions::default()
     };
     let log = args.logs.read(&stage, options)?;
-    let created = args.created.clone().unwrap_or_default();
+    let created = args.report.created.clone().unwrap_or_default();
     let blob = (&old, known.as_ref());
     let updated = Updated::new(blob, &log, &stage, args.what, created)?;
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &updated.figures)?;
+    let (set, known) = (&updated.new.set, updated.new.known.as_ref());
+    let (report, as_found) = updated.report(&old, &log, &stage);
+    args.report.add(&mut outputs, || {
+        let what = (CERTIFICATE, set.serial.as_str());
+        let mut source = args
+            .report
+            .source(what, &args.logs, (&log, &stage), updated.subject());
+        for (path, set, what) in [
+            (&args.params, &old, "parameter blob, as found"),
+            (&args.out, set, "parameter blob, as left"),
+        ] {
+            let blob = blob_file::to_bytes(path, set)?;
+            source.provenance.add_bytes(path, &blob, what);
+        }
+        source.warnings.clone_from(&updated.warnings);
+        source.report = Some(&report);
+        source.as_found = Some(as_found);
+        Ok(source)
+    })?;
     if updated.refusal.is_none() {
-        let (set, known) = (&updated.new.set, updated.new.known.as_ref());
         posterior_file::add_calibration(&mut outputs, &args.out, set, known)?;
     }
     let details = updated.figures.tables();

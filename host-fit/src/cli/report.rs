@@ -73,6 +73,7 @@ impl ReportArgs {
             provenance,
             warnings: words::messages(&log.warnings),
             report: None,
+            as_found: None,
         }
     }
 

@@ -11,8 +11,8 @@
 //! [`runtime::status`], in decimal: 0 when all is good. A field that it calls invalid is 0,
 //! or the last valid one if held.
 //!
-//! With uncertainties a line ends with three more fields, `u_x_um,u_y_um,u_rz_urad`: the standard
-//! uncertainty of X, Y, Rz, four significant digits.
+//! With uncertainties a line ends with `u_x_um,u_y_um,u_rz_urad`, the standard uncertainty of X, Y, Rz by parameters and
+//! noise, and `uc_x_um,uc_y_um,uc_rz_urad`, the combined standard uncertainty: four significant digits.
 //!
 //! X, Y, Rz of a log with a commanded pose are corrected by its speed and acceleration, if the parameters have a
 //! motion correction.
@@ -28,7 +28,7 @@ mod uncertainty;
 
 pub use stream::{DecodeSettings, PoseFormat, decode_log};
 pub use summary::StatusCounts;
-pub use uncertainty::uncertainty;
+pub use uncertainty::KnownErrors;
 
 use runtime::Reading;
 

@@ -1,10 +1,12 @@
 //! The posterior of a fit as a file beside its blob: the prior of a recalibration.
 //!
 //! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS2` in ASCII, the fields of `Content` in postcard,
-//! and the SHA-256 of all before it.
+//! the budget in postcard if there is one, and the
+//! SHA-256 of all before it.
 
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
+use hallstage_calibration::budget::Budget;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::source::{SourceError, read_whole};
 use hallstage_solver::estimator::terms::COUNT;
@@ -147,6 +149,7 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
         noise,
         misfit,
         repaired,
+        budget,
     } = known;
     let rows = 0..covariance.nrows();
     let content = Content {
@@ -159,6 +162,9 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
     };
     // Into memory it does not fail.
     let mut bytes = postcard::to_extend(&content, MAGIC.to_vec()).unwrap_or_default();
+    if let Some(budget) = budget {
+        bytes = postcard::to_extend(budget, bytes).unwrap_or_default();
+    }
     bytes.extend(Sha256::digest(&bytes));
     bytes
 }
@@ -173,7 +179,12 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     if Sha256::digest(&bytes[..MAGIC.len() + content.len()])[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let content: Content = postcard::from_bytes(content).map_err(|error| error.to_string())?;
+    let wrong = |error: postcard::Error| error.to_string();
+    let (content, rest): (Content, &[u8]) = postcard::take_from_bytes(content).map_err(wrong)?;
+    let budget: Option<Budget> = match rest {
+        [] => None,
+        rest => Some(postcard::from_bytes(rest).map_err(wrong)?),
+    };
     let triangle = &content.triangle;
     let has_rows = |rows: &usize| triangle.len() == rows * (rows + 1) / 2;
     let rows = ROWS
@@ -191,7 +202,10 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         ..
     } = content;
     let mut noise = [white_mm, drift_mm].concat().into_iter().chain([misfit]);
-    if !noise.all(|x| x >= 0.0 && x.is_finite()) || !is_covariance(&covariance) {
+    if !noise.all(|x| x >= 0.0 && x.is_finite())
+        || !is_covariance(&covariance)
+        || !budget.iter().all(Budget::is_finite)
+    {
         return Err("its numbers are no noise and no covariance".to_owned());
     }
     let known = StoredPosterior {
@@ -202,6 +216,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         },
         misfit,
         repaired: content.repaired,
+        budget,
     };
     Ok((content.blob, known))
 }
@@ -234,6 +249,7 @@ mod tests {
             },
             misfit: 1.02,
             repaired: Vec::new(),
+            budget: None,
         }
     }
 

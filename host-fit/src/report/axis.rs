@@ -28,16 +28,13 @@ impl Axis {
     }
 }
 
-/// A number at an axis, in few digits.
-pub(super) fn short(x: f64) -> String {
-    let digits = match x.abs() {
-        100.0.. => 0,
-        1.0.. => 1,
-        0.01.. => 3,
-        ..1e-9 => return "0".to_owned(),
-        _ => return format!("{x:.0e}"),
-    };
-    trimmed(x, digits)
+/// A number at an axis with this step, in few digits.
+pub(super) fn short(x: f64, step: f64) -> String {
+    match step {
+        _ if x.abs() < 0.5 * step => "0".to_owned(),
+        ..1e-3 => format!("{x:.0e}"),
+        _ => trimmed(x, (-step.log10().floor()).max(0.0) as usize),
+    }
 }
 
 #[cfg(test)]
@@ -53,7 +50,14 @@ mod tests {
 
     #[test]
     fn numbers_at_an_axis_are_short() {
-        let numbers = [0.0, -500.0, 2.5, 0.05, 1e-4, 20.0].map(short);
-        assert_eq!(numbers, ["0", "-500", "2.5", "0.05", "1e-4", "20"]);
+        let numbers = [
+            (0.0, 1.0),
+            (-500.0, 250.0),
+            (2.5, 0.5),
+            (20.02, 0.02),
+            (1e-4, 1e-4),
+        ];
+        let numbers = numbers.map(|(x, step)| short(x, step));
+        assert_eq!(numbers, ["0", "-500", "2.5", "20.02", "1e-4"]);
     }
 }

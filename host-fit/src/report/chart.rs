@@ -8,6 +8,8 @@ use std::fmt::Write;
 /// Ends of the abscissa and of the ordinate of a panel, in units of the drawing, about half a pixel each.
 const X: [f64; 2] = [104.0, 696.0];
 const Y: [f64; 2] = [144.0, 6.0];
+/// What is free of marks at both ends of an axis, as a part of it.
+const ROOM: f64 = 0.04;
 
 /// A role. The style sheet gives each its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -78,9 +80,23 @@ fn at(axis: Axis, value: f64, [low, high]: [f64; 2]) -> f64 {
     (10.0 * (low + axis.place(value) * (high - low))).round() / 10.0
 }
 
+/// The marks of an axis, at least two, none so near to an end that it meets one of the next panel.
 fn marks(axis: Axis, count: f64, ends: [f64; 2]) -> Vec<(f64, String)> {
-    let mark = |value| (at(axis, value, ends), short(value));
-    axis.marks(count).into_iter().map(mark).collect()
+    let is_inside = |value: &f64| (ROOM..=1.0 - ROOM).contains(&axis.place(*value));
+    let marks = [1.0, 2.0, 4.0].map(|finer| {
+        let mut marks = axis.marks(finer * count);
+        marks.retain(is_inside);
+        marks
+    });
+    let enough = marks.iter().find(|marks| marks.len() > 1);
+    let marks = enough.map_or(&[][..], Vec::as_slice);
+    let step = marks
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .next()
+        .unwrap_or(1.0);
+    let mark = |&value: &f64| (at(axis, value, ends), short(value, step));
+    marks.iter().map(mark).collect()
 }
 
 /// Tone, class and path of a mark.
@@ -120,4 +136,31 @@ fn ordinate(marks: &[Mark]) -> Axis {
     };
     let largest = 1.08 * marks.iter().map(largest).fold(1e-6, f64::max);
     Axis(-largest, largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_has_two_marks_or_more_with_other_texts_away_from_its_ends() {
+        for k in 1..400 {
+            let end = 1.03f64.powi(k) * 1e-2;
+            for axis in [Axis(-end, end), Axis(20.0, 20.0 + end), Axis(0.0, end)] {
+                let marks = marks(axis, 4.0, X);
+                let mut texts: Vec<&String> = marks.iter().map(|(_, text)| text).collect();
+                texts.dedup();
+                assert!(
+                    texts.len() > 1 && texts.len() == marks.len(),
+                    "{axis:?} {marks:?}"
+                );
+                let room = 0.9 * ROOM * (X[1] - X[0]);
+                assert!(
+                    marks
+                        .iter()
+                        .all(|(x, _)| (X[0] + room..X[1] - room).contains(x))
+                );
+            }
+        }
+    }
 }

@@ -15,8 +15,12 @@ use serde::Serialize;
 pub struct Page<'a> {
     /// Its title.
     pub title: &'static str,
+    /// The number of the certificate; empty without one.
+    pub number: &'a str,
     /// Whether a calibration can be used.
     pub verdict: Summary,
+    /// Tables that stand beside the verdict.
+    pub first: Vec<Table>,
     /// Name and text of the other facts on a certificate.
     pub facts: Vec<[String; 2]>,
     /// What was found.
@@ -80,11 +84,21 @@ fn rendered(name: &str, template: &str, of: &impl Serialize) -> Result<String, E
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
     engine.add_global("style", include_str!("style.css"));
+    engine.add_filter("css", css);
     engine.add_template("cells.html", include_str!("cells.html"))?;
     engine.add_template("chart.html", include_str!("chart.html"))?;
     engine.add_template("verdict.html", include_str!("verdict.html"))?;
     engine.add_template("findings.html", include_str!("findings.html"))?;
     engine.render_named_str(name, template, Serde(of))
+}
+
+/// A text between quotation marks of a style sheet: all but letters and digits of ASCII by their numbers.
+fn css(text: &str) -> String {
+    let escaped = |c: char| match c.is_ascii_alphanumeric() {
+        true => c.to_string(),
+        false => format!("\\{:x} ", u32::from(c)),
+    };
+    text.chars().map(escaped).collect()
 }
 
 impl Page<'_> {

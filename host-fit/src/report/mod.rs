@@ -1,6 +1,7 @@
 //! What a fit, a judgement or a plan shows: JSON, text tables, plots, an HTML page.
 
 pub mod axis;
+pub mod budget;
 pub mod channels;
 pub mod chart;
 mod charts;

@@ -2,7 +2,7 @@
 //! calibration: a certificate first, then what it rests on.
 
 use super::charts::Log;
-use super::errors::{designed, error_table, to_micro};
+use super::errors::{RowErrors, designed, error_table, to_micro};
 use super::html::{Cause, Page, Section};
 use super::parameters;
 use super::provenance::Provenance;
@@ -12,15 +12,21 @@ use super::text::file_name;
 use super::trusted::reference;
 use super::verdict::{Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
-use hallstage_calibration::judge::statistics::white_noise;
+use hallstage_calibration::judge::statistics::{PoseError, white_noise};
 use hallstage_calibration::words;
 use hallstage_input::axis::{AXES, Axis, counted, sign};
 use hallstage_input::dataset::Dataset;
-use hallstage_input::stage::Stage;
+use hallstage_input::stage::{Stage, TEXTS};
 use hallstage_solver::estimator::model::Model;
 use minijinja::Error;
 use runtime::ModelKind;
 
+/// The title of a page that may be a certificate.
+pub const CERTIFICATE: &str = "Calibration certificate";
+/// The same until the fields of a certificate are filled in.
+const REPORT: &str = "Calibration report";
+const NO_DATE: &str = "not given; name it with --created";
+const NO_SERIAL: &str = "without serial number";
 /// Movements that the page lists.
 const MOVEMENTS_MAX: usize = 1000;
 
@@ -43,6 +49,19 @@ pub struct Source<'a> {
     pub warnings: Vec<String>,
     /// The report, if there is a fit or a blob.
     pub report: Option<&'a Report>,
+    /// The calibration before it was brought up to date.
+    pub as_found: Option<AsFound>,
+}
+
+/// A calibration before it was brought up to date.
+#[derive(Clone, Debug)]
+pub struct AsFound {
+    /// Its errors by row, m, m, rad.
+    pub by_row: RowErrors,
+    /// Over these.
+    pub errors: PoseError,
+    /// Its errors and those of the new calibration, on the log and in service.
+    pub table: Table,
 }
 
 /// What a person says of a run, in the order of a certificate.
@@ -53,14 +72,10 @@ pub fn facts(
     notes: &[(String, String)],
 ) -> Vec<[String; 2]> {
     let date = match created {
-        None | Some("") => "not given; name it with --created",
+        None | Some("") => NO_DATE,
         Some(date) => date,
     };
-    let serial = if serial.is_empty() {
-        "without serial number"
-    } else {
-        serial
-    };
+    let serial = if serial.is_empty() { NO_SERIAL } else { serial };
     let operator = operator.map(|name| ("operator", name));
     let notes = notes.iter().map(|(key, value)| (&**key, &**value));
     let facts = [("stage", serial)].into_iter().chain(operator);
@@ -90,8 +105,13 @@ impl Source<'_> {
             tables: vec![self.provenance.0.clone()],
             ..Section::default()
         });
+        let is_certificate = self.title != CERTIFICATE || self.missing().is_empty();
+        let [number, ..] = &stage.certificate.texts;
+        let title = if is_certificate { self.title } else { REPORT };
         let page = Page {
-            title: self.title,
+            title,
+            number,
+            first: self.as_found.iter().map(|of| of.table.clone()).collect(),
             verdict: Summary::new(&self.subject),
             facts: self.facts(),
             causes: Cause::grouped(&self.subject.diagnosis.findings),
@@ -101,10 +121,49 @@ impl Source<'_> {
         page.html()
     }
 
-    /// The facts of a certificate besides the verdict: operator, date, stage, range of validity.
+    /// What a certificate by ISO/IEC 17025, 7.8 lacks.
+    fn missing(&self) -> Vec<&'static str> {
+        let texts = TEXTS.iter().zip(&self.stage.certificate.texts);
+        let texts = texts.filter_map(|(key, text)| text.is_empty().then_some(*key));
+        let placeholders = [(NO_DATE, "date"), (NO_SERIAL, "serial number")];
+        let is_open = |text: &str| self.facts.iter().any(|[_, given]| given == text);
+        let open = placeholders
+            .iter()
+            .filter_map(|(text, name)| is_open(text).then_some(*name));
+        texts.chain(open).collect()
+    }
+
+    /// The facts of a certificate besides the verdict: laboratory, operator, date, stage, range of validity.
     fn facts(&self) -> Vec<[String; 2]> {
-        let mut facts = self.facts.clone();
+        let table = &self.stage.certificate;
+        let texts = TEXTS
+            .iter()
+            .zip(&table.texts)
+            .filter(|(_, text)| !text.is_empty());
+        let texts = texts.map(|(key, text)| [key.replace('_', " "), text.clone()]);
+        let mut facts: Vec<[String; 2]> = texts.collect();
+        let missing = self.missing();
+        let is_begun = !facts.is_empty();
+        facts.extend(self.facts.iter().cloned());
         let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);
+        if self.title == CERTIFICATE && is_begun && !missing.is_empty() {
+            add("missing for a certificate", missing.join(", "));
+        }
+        if is_begun {
+            add(
+                "scope",
+                "the results hold for this stage, in the state of the log".to_owned(),
+            );
+        }
+        if self.subject.in_service {
+            let rule = match table.is_guarded {
+                true => {
+                    "guarded acceptance (JCGM 106): the limit is less the uncertainty of the rms error, one-sided 95 %"
+                }
+                false => "simple acceptance (JCGM 106): rms errors in service at most at the limit",
+            };
+            add("decision rule", rule.to_owned());
+        }
         if let Some(Report { set, .. }) = self.report {
             let c = &set.constants;
             let ends = [c.calibrated_planar, c.calibrated_vertical].concat();
@@ -117,7 +176,6 @@ impl Source<'_> {
                 _ => "movements like the log".to_owned(),
             });
             add("valid for", ranges.join(", "));
-            add("model", Model::from_kind(set.model).title());
         }
         add("temperature", self.temperature());
         let motion = self.subject.diagnosis.motion.as_ref();
@@ -160,12 +218,19 @@ impl Source<'_> {
     /// Errors, parameters, movements and all other figures.
     fn sections(&self, log: &Log, report: &Report) -> [Section; 5] {
         let noise = white_noise(&report.by_row, &self.dataset.movements);
-        let before = designed(self.dataset, self.stage);
         let after = format!("after: {}", Model::from_kind(report.set.model).title());
+        let (what, before) = match &self.as_found {
+            Some(found) => {
+                let before = (found.by_row.clone(), found.errors);
+                ("before: as found", Some(before))
+            }
+            None => {
+                let before = designed(self.dataset, self.stage);
+                ("before: designed values, Model (15)", before)
+            }
+        };
         let rows = [
-            before
-                .as_ref()
-                .map(|(_, errors)| ("before: designed values, Model (15)", to_micro(errors))),
+            before.as_ref().map(|(_, errors)| (what, to_micro(errors))),
             Some((after.as_str(), to_micro(&report.over_rows))),
             Some(("noise from row to row", noise.map(|x| [x * 1e6, f64::NAN]))),
         ];

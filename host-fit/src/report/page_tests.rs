@@ -7,7 +7,7 @@ use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_input::dataset::{Movement, Row};
-use hallstage_input::finding::{Finding, Kind};
+use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, stage};
 
@@ -60,6 +60,7 @@ fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> S
         provenance,
         warnings: Vec::new(),
         report: None,
+        as_found: None,
     }
 }
 
@@ -154,4 +155,37 @@ fn the_page_of_a_refused_log_has_its_findings_by_cause() {
     assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));
     assert!(page.contains("A &amp; B.csv: Rows come"));
     assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
+}
+
+#[test]
+fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
+    let mut stage = stage();
+    let dataset = shipped(&stage);
+    let diagnosis = Diagnosis {
+        findings: vec![
+            Finding::new(Kind::UnevenTimes { rms_us: 3.0 }).with_severity(Severity::Warn),
+            Finding::new(Kind::UnevenTimes { rms_us: 3.0 }).with_severity(Severity::Note),
+        ],
+        ..Diagnosis::default()
+    };
+    let page = |stage: &Stage| {
+        let subject = subject(End::Written, &diagnosis);
+        source(stage, &dataset, subject).html().expect("a page")
+    };
+    assert!(page(&stage).contains("<h1>Calibration report</h1>"));
+    stage.certificate.texts = TEXTS.map(|key| format!("of \"</{key}>"));
+    let full = page(&stage);
+    assert!(full.contains("<h1>Calibration certificate</h1>"));
+    // On the foot of each page.
+    assert!(full.contains("of\\20 \\22 \\3c \\2f number\\3e "), "{full}");
+    assert!(!full.contains("\"</number>") && full.contains("counter(pages)"));
+    assert_eq!(
+        full.matches("<details class=\"finding warn\" open>")
+            .count(),
+        1
+    );
+    stage.certificate.texts[2].clear();
+    let open = page(&stage);
+    assert!(open.contains("<h1>Calibration report</h1>"));
+    assert!(open.contains("<td>missing for a certificate</td><td>customer</td>"));
 }

@@ -7,6 +7,8 @@ use hallstage_input::dataset::Dataset;
 use sha2::{Digest, Sha256};
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Everything that is needed to repeat the calibration: name, description, and SHA-256 of each file.
@@ -26,7 +28,7 @@ impl Provenance {
         provenance
     }
 
-    /// Adds a row: of a file its SHA-256 in hexadecimal digits too, of a log without compression.
+    /// Adds a row: of a file its SHA-256 in hexadecimal digits too.
     fn add(&mut self, name: impl Into<String>, what: String, sha256: &str) {
         let what = match sha256 {
             "" => what,
@@ -48,9 +50,8 @@ impl Provenance {
         self.add(file_name(path), what.to_owned(), &hash);
     }
 
-    /// Adds the logs. They have one hash, which the blob holds too.
+    /// Adds the logs, each with the hash of its file, and the hash of their text, which the blob holds too.
     pub fn add_logs(&mut self, dataset: &Dataset) {
-        let hash = hex(&dataset.sha256);
         for (k, log) in dataset.logs.iter().enumerate() {
             let movements = counted(log.movements_read, "movement");
             let (rows, drawn) = (log.rows_read, log.rows.len());
@@ -59,16 +60,26 @@ impl Provenance {
                 true => format!("; {drawn} of them, in {}, are drawn", counted(runs, "run")),
                 false => String::new(),
             };
-            let hash = if dataset.logs.len() == 1 {
-                hash.as_str()
-            } else {
-                ""
-            };
             let what = format!("log, {rows} rows in {movements}{drawn}");
-            self.add(file_name(&log.path), what, hash);
+            self.add(
+                file_name(&log.path),
+                what,
+                &hash_of_file(&log.path).unwrap_or_default(),
+            );
         }
-        if dataset.logs.len() > 1 {
-            self.add("all logs", "one after the other".to_owned(), &hash);
+        let what = "without compression, one after the other; the blob holds this hash";
+        self.add("text of all logs", what.to_owned(), &hex(&dataset.sha256));
+    }
+}
+
+/// The SHA-256 of a file as it lies on the disk; `None` of standard input.
+fn hash_of_file(path: &Path) -> Option<String> {
+    let (mut file, mut hash) = (File::open(path).ok()?, Sha256::new());
+    let mut part = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut part).ok()? {
+            0 => return Some(hex(&hash.finalize())),
+            bytes => hash.update(&part[..bytes]),
         }
     }
 }
@@ -104,8 +115,8 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hallstage_input::log::{ReadOptions, read_bytes};
-    use hallstage_input::shipped::{self, LOG_GZ};
+    use hallstage_input::log::{ReadOptions, read, read_bytes};
+    use hallstage_input::shipped::{self, LOG_GZ, RUN_GZ};
 
     #[test]
     fn the_command_can_be_given_again_as_it_stands() {
@@ -123,6 +134,19 @@ mod tests {
             rows[0][1],
             r"host-fit fit 'my log.csv' --serial 'it'\''s' ''"
         );
+    }
+
+    #[test]
+    fn the_hash_of_a_log_is_of_its_file_as_it_lies_on_the_disk() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.csv.gz");
+        std::fs::write(&path, RUN_GZ).expect("written");
+        let log = read(&[&path], &shipped::stage(), &ReadOptions::FIT).expect("sound");
+        let mut provenance = Provenance::default();
+        provenance.add_logs(&log.dataset);
+        let rows = provenance.0.cells().rows;
+        assert!(rows[0][1].ends_with(&hex(&Sha256::digest(RUN_GZ))));
+        assert!(rows[1][1].ends_with(&hex(&log.dataset.sha256)));
     }
 
     #[test]

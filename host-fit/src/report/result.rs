@@ -1,5 +1,6 @@
 //! The report of a fit, or of a blob that was judged: made once, shown as JSON, as tables and as a page.
 
+use super::budget;
 use super::channels::channels;
 use super::errors::{RowErrors, errors, errors_per_degree, errors_per_log};
 use super::field;
@@ -96,6 +97,7 @@ impl Report {
     /// | `zero_deviations` | of each movement that was judged |
     /// | `verdict`, `predicted`, `valid_within_k` | whether the blob can be used, its errors predicted for service, how far from the temperature of the log they hold; null where the log cannot show them |
     /// | `valid_up_to` | the largest rms acceleration and speed of all axes at once with good errors |
+    /// | `budget` | sources of uncertainty with their contributions to X, Y, Rz, combined and expanded; inputs not included |
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `channels` | properties of each column of the logs |
     /// | `reference` | the calibrated point, and the places of the beams |
@@ -135,6 +137,7 @@ impl Report {
             "warnings" => json!(judged.warnings),
             "verdict" => json!(diagnosis.verdict),
             "predicted" => json!(diagnosis.predicted),
+            "budget" => diagnosis.budget.as_ref().map(budget::figures),
             "valid_within_k" => json!(diagnosis.validity.map(|validity| validity.within_k)),
             "valid_up_to" => json!(diagnosis.motion.map(valid_up_to)),
             "temperatures" => several(errors_per_degree(dataset, &judged.by_row)),

@@ -1,5 +1,6 @@
 //! What a person reads first: whether the calibration can be used, its errors by axis, what to do next.
 
+use super::budget::{self, COVERAGE};
 use super::figure::{Figure, micro};
 use super::table::Table;
 use super::text::as_text;
@@ -59,6 +60,10 @@ pub struct Summary {
     pub sentence: String,
     /// A row for each axis.
     pub axes: Table,
+    /// A row for each source of uncertainty.
+    pub budget: Table,
+    /// The inputs that the budget lacks.
+    pub not_included: String,
     /// What to do next; empty if nothing.
     pub next: String,
     /// Whether that is the remedy of a finding. The message of the finding ends with it.
@@ -70,6 +75,7 @@ impl Summary {
     /// The summary of a run.
     pub fn new(of: &Subject) -> Self {
         let predicted = of.diagnosis.predicted.as_ref();
+        let budget = of.diagnosis.budget.as_ref();
         let verdict = of.diagnosis.verdict;
         let remedy = remedy(of, verdict);
         let (mark, word) = match (of.end, verdict) {
@@ -87,6 +93,8 @@ impl Summary {
             word,
             sentence: sentence(of),
             axes: axes(of, predicted),
+            budget: budget.map(budget::table).unwrap_or_default(),
+            not_included: budget.map_or(String::new(), |budget| budget.not_included.join(", ")),
             is_remedy: remedy.is_some(),
             next: remedy.unwrap_or_else(|| next(of, verdict).to_owned()),
         }
@@ -121,7 +129,8 @@ fn sentence(of: &Subject) -> String {
 }
 
 /// By axis: rms over all rows, noise, rms predicted for service, the limit of one of these, expanded uncertainty. The
-/// uncertainty is twice the rms in service, or on the log if service is not predicted; k = 2 covers 95 % of normal errors.
+/// uncertainty is twice the combined uncertainty of the budget, or else the rms in service, or on the log; k = 2 covers
+/// 95 % of normal errors.
 fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
     if of.errors.is_none() && predicted.is_none() {
         return Table::default();
@@ -148,9 +157,12 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         let rms = of.errors.map(|errors| errors.axes[k].rms);
         let service = predicted.map(|predicted| predicted.rms[k]);
         let noise = predicted.map(|predicted| predicted.rms[k] / predicted.ratio[k]);
+        // A sensor that stays wrong may exceed it without a refusal.
+        let is_refused = of.diagnosis.verdict == Some(Verdict::Refused);
         let own = noise
             .filter(|_| of.is_field)
             .map(|noise| LIMITED_MAX * noise);
+        let own = own.filter(|own| is_refused || service <= Some(*own));
         let (limit, measured) = match of.in_service {
             true => (
                 of.limits[k].into_iter().chain(own).reduce(f64::min),
@@ -159,7 +171,9 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
             false => (of.limits[k], rms),
         };
         let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
-        let uncertainty = service.or(rms).map(|rms| 2.0 * rms);
+        let budget = of.diagnosis.budget.as_ref();
+        let combined = budget.map(|budget| budget.combined()[0][k]);
+        let uncertainty = combined.or(service).or(rms).map(|rms| COVERAGE * rms);
         let error = |error: Option<f64>| error.map_or(Figure::None, |error| micro(axis, error));
         let mut figures = [rms, noise, service, limit].map(error).to_vec();
         figures.extend([passes.map_or(Figure::None, Figure::Is), error(uncertainty)]);

@@ -123,6 +123,50 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
     assert_eq!(bench.json("p.json")["model"], "31");
 }
 
+/// A baseline that is known ten times worse: the page, the JSON and each decoded pose say so.
+#[test]
+fn the_budget_of_a_fit_reaches_the_page_and_the_uncertainty_of_each_pose() {
+    let bench = bench();
+    let stage = bench.text("stage.toml");
+    bench.write(
+        "rough.toml",
+        stage.replace("baseline_m = 0.17e-3", "baseline_m = 1.7e-3"),
+    );
+    let [usual, rough] = ["stage", "rough"].map(|stage| {
+        let fit = "fit log.csv --out p.bin --json p.json --report report --force";
+        bench.good(&format!("{fit} --stage {stage}.toml"));
+        let budget = bench.json("p.json")["budget"].clone();
+        let absent = budget["not_included"].to_string();
+        assert!(
+            absent.contains("beam_angles_rad") && absent.contains("drift"),
+            "{absent}"
+        );
+        let page = bench.text("report/index.html");
+        assert!(page.contains("Uncertainty budget") && page.contains("beam_angles_rad"));
+        // The stage file of a decoding says nothing of the reference of the fit.
+        bench.good("decode p.bin service.csv --out pose.csv --uncertainty --force");
+        let poses = bench.text("pose.csv");
+        let names = "status,u_x_um,u_y_um,u_rz_urad,uc_x_um,uc_y_um,uc_rz_urad";
+        assert!(poses.lines().next().expect("a header").ends_with(names));
+        let poses = rows(&poses);
+        let mean = |column: usize| {
+            poses.iter().map(|row| row[column].powi(2)).sum::<f64>() / poses.len() as f64
+        };
+        let combined = number(&budget["combined"]["rms"]["rz_urad"]);
+        [combined, mean(11).sqrt(), mean(14).sqrt(), mean(4).sqrt()]
+    });
+    assert!(
+        (usual[1] - rough[1]).abs() < 1e-3 * usual[1],
+        "{usual:?} {rough:?}"
+    );
+    // 1.7 % of Rz: its rms in service is half of 500 urad.
+    for (k, rz_urad) in [(0, 250.0), (2, usual[3])] {
+        let added = (rough[k].powi(2) - usual[k].powi(2)).sqrt();
+        let wanted = 0.017 * rz_urad;
+        assert!((added / wanted - 1.0).abs() < 0.02, "{usual:?} {rough:?}");
+    }
+}
+
 #[test]
 fn a_log_of_little_motion_is_a_warning() {
     let bench = bench();

@@ -90,7 +90,7 @@ fn the_report_pages_show_what_was_given_escape_every_text_and_name_no_folder() {
         bench.good(&format!("{command} {more} --stage {folder}/stage.toml"));
     }
     for (name, title) in [
-        ("fit", "Calibration certificate"),
+        ("fit", "Calibration report"),
         ("eval", "Verification of a calibration"),
         ("check", "Check of a log"),
     ] {

@@ -36,8 +36,18 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     bench.write("later.csv", with_gains(&bench.text("log.csv"), [0.99; 3]));
     let recalibrate = "recalibrate old.bin weak.csv --what gain";
     bench.good(&format!(
-        "{recalibrate} --out new.bin --created today --json new.json"
+        "{recalibrate} --out new.bin --created today --json new.json --report page"
     ));
+    let page = bench.text("page/index.html");
+    for part in [
+        "As found and as left",
+        "X, as found",
+        "before: as found",
+        "old.bin",
+        "as left, SHA-256",
+    ] {
+        says(&page, part);
+    }
     let json = bench.json("new.json");
     for probe in ["a", "b", "c"] {
         let gain = &json["gains"][probe];

@@ -1,6 +1,6 @@
 //! A simulated stage that warms in service: fitted cold, brought up to date warm, judged over the day.
 
-use crate::common::{Bench, number, plan, says, stderr};
+use crate::common::{Bench, number, plan};
 
 const TEMPERATURE: &str = "
 [temperature]
@@ -77,8 +77,12 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
     // A blob that follows temperatures, on a log that has none.
     let without: Vec<String> = bench.text("warm.csv").lines().map(first_columns).collect();
     bench.write("none.csv", without.join("\n") + "\n");
-    let none = stderr(&bench.good("eval warm.bin none.csv --stage warm.toml --limit 99"));
-    says(&none, "rows have no temperature");
+    let words = ["rows have no temperature", "beyond the limit: y"];
+    bench.bad(
+        "eval warm.bin none.csv --stage warm.toml --limit 99",
+        4,
+        &words,
+    );
     bench.bad(
         "fit cold.csv none.csv --stage warm.toml --out x.bin",
         4,

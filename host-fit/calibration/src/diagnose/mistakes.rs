@@ -38,8 +38,15 @@ pub(super) struct Mistake {
     pub(super) change: Transform,
 }
 
+impl Mistake {
+    /// Whether the beams are read in single pass for double pass, or the reverse.
+    pub(super) fn is_other_pass(&self) -> bool {
+        self.correction.is_scale_of_beams() && matches!(self.value, Some(0.5 | 2.0))
+    }
+}
+
 /// Factors per decade that are tried.
-const FACTORS: i32 = 24;
+const FACTORS: i32 = 48;
 /// Decades of factors: units may be um for m.
 const POWERS: i32 = 6;
 /// Step of the turns that are tried, degrees.

@@ -52,7 +52,8 @@ mod structure_tests;
 pub mod temperature;
 mod units;
 
-use crate::fit::{Fit, FitError, FitSettings, ModelChoice, Repair, fit};
+use crate::budget::Budget;
+use crate::fit::{Estimate, Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::InMotion;
 use crate::judge::predicted::{Predicted, Validity};
@@ -66,6 +67,7 @@ use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::terms::COUNT;
 pub use limits::ERROR_TO_NOISE_MAX;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
@@ -86,6 +88,8 @@ pub struct Diagnosis {
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log: see [`Fit::repaired`]. The verdict is about them.
     pub repair: Option<Repair>,
+    /// The uncertainty in service, source by source, of a calibration by the field model.
+    pub budget: Option<Budget>,
     /// How far from the temperature of the log a calibration by the field model is good.
     pub validity: Option<Validity>,
     /// What speed and acceleration add in service; [`Self::predicted`] includes it.
@@ -132,7 +136,9 @@ pub fn diagnose_log(
         Ok(_) => true,
         Err(error) => matches!(error, FitError::Failed(FitFailure::NotDescribed { .. })),
     };
-    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, is_described);
+    let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
+    let described = (is_described, estimate);
+    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, described);
     out.findings.extend(poor);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
@@ -175,18 +181,20 @@ pub fn diagnose_log(
         (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
     }
     out.conclude(stays, basis);
-    out.validity = field.and_then(|_| {
-        let estimate = fitted.ok().map(|fit| &fit.estimate)?;
-        let (mut parameters, mut covariance) =
-            (estimate.parameters, estimate.posterior.covariance.clone());
+    if let (Some(figures), Ok(fit)) = (field, fitted) {
+        let estimate = &fit.estimate;
+        let (mut parameters, mut posterior) = (estimate.parameters, estimate.posterior.clone());
         if let Some(repair) = &out.repair {
             parameters = repair.parameters;
-            covariance
-                .view_mut((0, 0), repair.covariance.shape())
-                .copy_from(&repair.covariance);
+            posterior = posterior.with_parameters(&parameters, &repair.covariance);
         }
-        Validity::new(stage, &parameters, estimate.posterior.white_m, &covariance)
-    });
+        let (white_m, covariance) = (posterior.white_m, &posterior.covariance);
+        out.validity = Validity::new(stage, &parameters, white_m, covariance);
+        let known = (&parameters, &posterior);
+        let freedom = figures.score.residuals.saturating_sub(COUNT);
+        out.budget = (out.predicted.as_ref())
+            .and_then(|of| Budget::new(stage, known, &estimate.temperature, of, freedom));
+    }
     out
 }
 
@@ -211,14 +219,14 @@ const fn stands(found: &Finding) -> bool {
 
 impl Diagnosis {
     /// Adds the faults of signals, channels and structure, and what they predict. The lags of A, B, C behind their
-    /// mean, s, where the log shows them. `is_described` where the parameters describe the log.
+    /// mean, s, where the log shows them. `is_described` where the parameters describe the log, `estimate` of a fit of the field model.
     fn add_faults(
         &mut self,
         dataset: &Dataset,
         without_outliers: &Dataset,
         stage: &Stage,
         by: Calibrated,
-        is_described: bool,
+        (is_described, estimate): (bool, Option<&Estimate>),
     ) -> Option<[f64; 3]> {
         let (findings, bad) = signals::signal_findings(dataset, stage, &self.columns);
         self.findings = findings;
@@ -226,16 +234,28 @@ impl Diagnosis {
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
         let rows = has_channels.then(|| find_faults(&dataset.without(&bad), stage, by, is_bent));
         let of_rows = rows.flatten();
-        // A repair that leads to residuals of noise explains the log; no mistake is needed.
-        let explains = |of: &Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
-        if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
-            let parts = |found: &Finding| found.code() == Code::LogsDisagree;
-            let disagree = of_rows
-                .as_ref()
-                .is_some_and(|of| of.findings.iter().any(parts));
-            let mistake = structure::structure(without_outliers, stage, disagree);
-            self.findings.extend(mistake);
-        }
+        // A repair that leads to residuals of noise explains the log, but not a drawing that it contradicts.
+        let explains = |of: &&Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
+        let repaired = of_rows
+            .as_ref()
+            .filter(explains)
+            .filter(|_| !is_refused(&self.findings));
+        let repaired = repaired.and_then(|of| of.repair.as_ref());
+        let parts = |found: &Finding| found.code() == Code::LogsDisagree;
+        let disagree = (of_rows.as_ref()).is_some_and(|of| of.findings.iter().any(parts));
+        // Faults that cost so much bend the fit.
+        let bends = |of: &Faults| is_refused(&of.findings);
+        let is_bent = is_refused(&self.findings) || of_rows.as_ref().is_some_and(bends);
+        let known = match (repaired, estimate) {
+            (Some((repair, _)), _) => Some((&repair.parameters, &repair.covariance)),
+            (None, Some(own)) if !is_bent => Some((&own.parameters, &own.posterior.covariance)),
+            _ => None,
+        };
+        let mistake = structure::structure(without_outliers, stage, disagree, known);
+        let stands_alone = |found: &Finding| {
+            repaired.is_none() || matches!(found.kind, Kind::Mistake { is_sure: true, .. })
+        };
+        self.findings.extend(mistake.filter(stands_alone));
         let mut of = of_rows?;
         self.predicted = of.predicted;
         if is_refused(&self.findings) {
@@ -332,7 +352,7 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    out.add_faults(dataset, dataset, stage, by, true);
+    out.add_faults(dataset, dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     out.findings

@@ -11,13 +11,15 @@ use crate::judge::identify::check_motion;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
-use hallstage_input::stage::Stage;
+use hallstage_input::stage::{Input, Range, Stage};
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
-use hallstage_solver::estimator::parameters::FALL_PER_M;
+use hallstage_solver::estimator::parameters::{FALL_PER_M, FieldParameters, place};
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
-use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
+use hallstage_solver::estimator::terms::{CARRY, ETA, LEVER_ARM, PER_PROBE, SLOPES, THETA};
+use nalgebra::{Cholesky, DMatrix, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
+use runtime::geometry::SensingAxes;
 
 /// For how long a model errs alike, s: its errors go with the motion. What stays unexplained
 /// counts as one residual in that time.
@@ -25,10 +27,14 @@ const ALIKE_S: f64 = 0.5;
 /// Unknowns of a probe: gains and their slopes, the shift of the probe by height and tilts, and the lags of the beams.
 const UNKNOWNS: usize = 12;
 
-/// Tolerances, standard deviations, up to twice the spread of simulated stages: of the logarithm of eta (replaced by
-/// its range in `stage.toml`), of theta, of a lever arm (m), of a/eta (1/mm), and of b/eta and c/eta (1/mrad), which
-/// show the place of a probe within 40 mm.
-const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
+/// Tolerances, standard deviations, up to four times the spread of simulated stages: of theta, and of a/eta (1/mm).
+const TOLERANCES: [f64; 2] = [0.04, 0.025];
+/// The same of a lever arm, m: from the drawing, and from the place that the slopes of the field model show.
+const LEVER_ARMS_M: [f64; 2] = [0.035, 0.004];
+/// b/eta and c/eta show the place of a probe. Magnets turn it by a third of the tolerance of the place.
+const SLOPES_TO_PLACE: f64 = 4.0 / 3.0 * -FALL_PER_M * UNIT;
+/// A sensitivity that nothing is known of.
+const ANY_ETA: Range = Range::new(0.5, 1.5);
 /// Columns of a fit are in this unit, m and rad: all unknowns are then about as large.
 const UNIT: f64 = 1e-3;
 /// Precision of a weak prior over the residual's, in this unit: unknowns that the log does not show stay finite.
@@ -47,6 +53,9 @@ const LEFT_MAX: f64 = 0.1;
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
 
+/// Parameters of the field model with their covariance.
+pub(super) type Known<'a> = (&'a FieldParameters, &'a DMatrix<f64>);
+
 /// A probe fitted by itself: gains by X, Y, Rz, and slopes over gain by Z, Rx, Ry, per [`UNIT`].
 #[derive(Clone, Copy, Debug)]
 struct Fitted {
@@ -56,12 +65,46 @@ struct Fitted {
     left: f64,
 }
 
+impl Fitted {
+    /// A probe by a fit of the field model.
+    fn of_field(probe: usize, (parameters, covariance): Known<'_>) -> Self {
+        let at = |values: &[f64]| {
+            let (eta, [along_x, along_y]) =
+                (values[ETA], SensingAxes::at([values[THETA]; 3]).0[probe]);
+            let gains = [along_x, along_y, values[LEVER_ARM]].map(|by| eta * by);
+            let slopes = values[SLOPES..CARRY].iter().map(|slope| slope / eta * UNIT);
+            Vector::from_iterator(gains.into_iter().chain(slopes))
+        };
+        let values = parameters.probes[probe];
+        let mut by = Covariance::zeros();
+        for k in 0..CARRY {
+            let mut moved = values;
+            let step = 1e-6 * values[k].abs().max(1e-3);
+            moved[k] += step;
+            by.set_column(k, &((at(&moved) - at(&values)) / step));
+        }
+        let own = probe * PER_PROBE;
+        let known = covariance.fixed_view::<CARRY, CARRY>(own, own);
+        Self {
+            at: at(&values),
+            covariance: by * known * by.transpose(),
+            left: 0.0,
+        }
+    }
+}
+
 /// The mistake that explains a log of another stage than designed, if there is one; `None` for a log without motion.
-/// A mistake can also make parts of the log `disagree`: then weaker evidence is a warning.
-pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Finding> {
+/// A mistake can also make parts of the log `disagree`: then weaker evidence is a warning. A fit of the field model knows
+/// the probes better.
+pub fn structure(
+    dataset: &Dataset,
+    stage: &Stage,
+    disagree: bool,
+    field: Option<Known<'_>>,
+) -> Option<Finding> {
     let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
-    let fitted = fitted(dataset, stage.servo_period_s)?;
+    let mut fitted = fitted(dataset, stage.servo_period_s)?;
     let strange = (0..3).filter(|&probe| fitted[probe].left > LEFT_MAX);
     let strange: Vec<Channel> = strange.map(|probe| Channel::SINGLE[probe]).collect();
     let spans = spans(dataset);
@@ -74,31 +117,37 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
             ..found
         });
     }
-    let drawing = Drawing::new(stage);
+    if let Some(known) = field {
+        fitted = [0, 1, 2].map(|probe| Fitted::of_field(probe, known));
+    }
+    let drawing = Drawing::new(stage, field.is_some());
     let distance = |change: &Transform| drawing.distance(&fitted, change);
     let as_logged = distance(&Transform::nothing());
     let mut rows = dataset.rows.iter();
-    let mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
+    let mut mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
     // Chance does not lower the distance by more than this.
     let usual = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
     let sure = 2.0 * libm::log(RARITY * usual.count() as f64);
     let likely = if disagree { UNDECIDED } else { sure };
-    if as_logged < likely {
-        return None;
-    }
     // The declared motion separates mistakes that the geometry cannot.
-    let rank = |mistake: Mistake| {
+    let rank = |mistake: &Mistake| {
         let of_motion = beyond_motion(stage, &spans, &mistake.change);
-        (
-            distance(&mistake.change) + of_motion + mistake.penalty,
-            mistake,
-        )
+        distance(&mistake.change) + of_motion + mistake.penalty
     };
-    let mut ranked: Vec<(f64, Mistake)> = mistakes.into_iter().map(rank).collect();
+    if as_logged < likely {
+        mistakes.retain(Mistake::is_other_pass);
+    }
+    let ranks = mistakes.iter().map(rank);
+    let mut ranked: Vec<(f64, &Mistake)> = ranks.zip(&mistakes).collect();
     ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    let least = ranked.first()?.0;
-    let gain = as_logged - least;
-    if least > SOUND_MAX || gain < likely {
+    let gain = as_logged - ranked.first()?.0;
+    if gain < likely {
+        // Single pass taken for double pass needs no odds: it is common, and a factor of two in each pose.
+        ranked.retain(|(rank, mistake)| mistake.is_other_pass() && *rank < as_logged);
+    }
+    let is_sure = gain > sure || gain < likely;
+    let least = ranked.first().map_or(f64::INFINITY, |(rank, _)| *rank);
+    if least > SOUND_MAX {
         let tolerances = (as_logged / SOUND_MAX).sqrt();
         let severity = match tolerances {
             ..1.0 => return None,
@@ -113,7 +162,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
         .iter()
         .take_while(|(rank, _)| *rank < least + UNDECIDED);
     let mut named: Vec<Vec<&Mistake>> = Vec::new();
-    for (_, mistake) in near {
+    for &(_, mistake) in near {
         match named
             .iter_mut()
             .find(|alike| alike[0].correction == mistake.correction)
@@ -122,7 +171,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
             None => named.push(vec![mistake]),
         }
     }
-    Some(finding(&named, gain > sure))
+    Some(finding(&named, is_sure))
 }
 
 fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
@@ -153,24 +202,46 @@ fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
 struct Drawing {
     eta: [f64; 3],
     theta: [f64; 3],
-    lever_arm: [f64; 3],
     places: [[f64; 2]; 3],
+    /// Whether slopes show places well enough for lever arms.
+    has_slopes: bool,
     tolerances: [Vector; 3],
 }
 
 impl Drawing {
-    fn new(stage: &Stage) -> Self {
+    fn new(stage: &Stage, has_slopes: bool) -> Self {
         let geometry = Parameters::designed(stage).geometry();
-        let (mut eta, mut tolerances) = ([1.0; 3], [Vector::from(TOLERANCES); 3]);
-        for (probe, range) in stage.search.get("eta").into_iter().flatten().enumerate() {
-            eta[probe] = 0.5 * (range.low + range.high);
-            tolerances[probe][0] = range.width() / (eta[probe] * 12f64.sqrt());
-        }
+        let etas = stage.search.get("eta").unwrap_or([ANY_ETA; 3]);
+        let (eta, places) = (
+            etas.map(|range| 0.5 * (range.low + range.high)),
+            stage.places_m(),
+        );
+        let known = |input: Input| stage.uncertainty.known(input);
+        // Parts of a lever arm and of a place.
+        let turn = known(Input::Baseline) / stage.interferometer.y_baseline_m;
+        let sides = stage.capacitive_probes_m.map(|[x, y]| x.hypot(y));
+        let tilt = known(Input::GapPlaces) / sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+        let tolerances = [0, 1, 2].map(|probe| {
+            let of_eta = etas[probe].width() / (eta[probe] * 12f64.sqrt());
+            let [of_theta, of_fall] = TOLERANCES;
+            let of_lever_arm = LEVER_ARMS_M[usize::from(has_slopes)];
+            let [x, y] = places[probe];
+            let reach = x.hypot(y);
+            let of_place = SLOPES_TO_PLACE * known(Input::ProbePlaces).hypot(reach * tilt);
+            Vector::from([
+                of_eta,
+                of_theta,
+                of_lever_arm.hypot(reach * turn.hypot(tilt)),
+                of_fall.hypot(FALL_PER_M * UNIT * known(Input::GapScale)),
+                of_place,
+                of_place,
+            ])
+        });
         Self {
             eta,
             theta: geometry.misalignment_rad,
-            lever_arm: geometry.lever_arm_m,
-            places: stage.places_m(),
+            places,
+            has_slopes,
             tolerances,
         }
     }
@@ -186,10 +257,20 @@ impl Drawing {
         let off = theta - self.theta[probe];
         let eta = x.hypot(y).max(f64::MIN_POSITIVE);
         let [place_x, place_y] = self.places[probe];
+        let mut slopes = [0.0; PER_PROBE];
+        if self.has_slopes {
+            slopes[SLOPES..CARRY].copy_from_slice(&[a, b, c].map(|slope| slope / UNIT));
+        }
+        let [there_x, there_y] = place(&slopes, self.places[probe]).0;
+        let (sin, cos) = libm::sincos(theta);
+        let lever_arm = match probe {
+            2 => there_x * sin - there_y * cos,
+            _ => there_x * cos + there_y * sin,
+        };
         Vector::from([
             libm::log(eta / self.eta[probe]),
             libm::atan2(libm::sin(off), libm::cos(off)),
-            turn / eta - self.lever_arm[probe],
+            turn / eta - lever_arm,
             a - FALL_PER_M * UNIT,
             b - a * place_y,
             c + a * place_x,

@@ -1,6 +1,7 @@
 //! Every mistake is named, with all mistakes that a log cannot separate from it.
 
 use super::structure::structure;
+use crate::fit::{FitSettings, ModelChoice, fit};
 use hallstage_input::channel::Channel::{
     self, BeamX, BeamY1, BeamY2, Gap1, Gap2, Gap3, HallA, HallB, HallC,
 };
@@ -15,6 +16,8 @@ use hallstage_simulate::assembly::Assembly;
 use hallstage_simulate::protocol::Protocol;
 use hallstage_simulate::recording::{Recording, Sample, record};
 use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::estimator::model::Model;
+use runtime::ModelKind;
 
 /// The shipped stage with a change of its file.
 fn stage(from: &str, to: &str) -> Stage {
@@ -70,7 +73,7 @@ fn are_named(found: &Finding, wanted: &[(Correction, Option<f64>)]) -> bool {
 fn a_sound_log_is_that_of_its_stage_also_a_short_one() {
     let stage = stage("", "");
     for dataset in datasets(&stage, |_| ()) {
-        assert_eq!(structure(&dataset, &stage, false), None);
+        assert_eq!(structure(&dataset, &stage, false, None), None);
     }
     // Two seconds show little, and the residuals of the simple form follow the motion.
     for seed in [22, 47, 67] {
@@ -78,7 +81,7 @@ fn a_sound_log_is_that_of_its_stage_also_a_short_one() {
         recording.movements.truncate(1);
         recording.movements[0].truncate(1000);
         let dataset = recording.dataset(&stage).expect("a triangle");
-        assert_eq!(structure(&dataset, &stage, false), None, "{seed}");
+        assert_eq!(structure(&dataset, &stage, false, None), None, "{seed}");
     }
 }
 
@@ -134,7 +137,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
     let stage = stage("", "");
     for (code, wanted, mistake) in mistakes {
         for dataset in datasets(&stage, mistake) {
-            let found = structure(&dataset, &stage, false).expect("a finding");
+            let found = structure(&dataset, &stage, false, None).expect("a finding");
             assert_eq!((found.code(), found.severity), (code, Severity::Refuse));
             assert!(are_named(&found, &wanted), "{wanted:?}: {found:?}");
             assert_eq!(causes(&found).len(), wanted.len(), "{found:?}");
@@ -167,7 +170,7 @@ fn a_mistake_in_the_stage_file_is_named() {
     ] {
         let stage = stage(from, to);
         for dataset in datasets(&stage, |_| ()) {
-            let found = structure(&dataset, &stage, false).expect("a finding");
+            let found = structure(&dataset, &stage, false, None).expect("a finding");
             assert!(
                 are_named(&found, &[(correction.clone(), value)]),
                 "{found:?}"
@@ -192,7 +195,7 @@ fn scales_near_one_are_named_with_what_may_be_the_cause_as_well() {
     let stage = stage("", "");
     for (severity, wanted, scale) in cases {
         for dataset in datasets(&stage, scale) {
-            let found = structure(&dataset, &stage, false).expect("a finding");
+            let found = structure(&dataset, &stage, false, None).expect("a finding");
             assert_eq!((found.code(), found.severity), (Code::ScaleWrong, severity));
             let causes = causes(&found);
             let has = |wanted: &Correction| causes.iter().any(|(named, _)| named == wanted);
@@ -219,7 +222,7 @@ fn places_of_the_hall_probes_at_twice_the_distance_are_named() {
             let [_, rx, ry] = &mut row.vertical;
             [rz, rx, ry].into_iter().for_each(|turn| *turn *= 2.0);
         }
-        let found = structure(&dataset, &stage, false).expect("a finding");
+        let found = structure(&dataset, &stage, false, None).expect("a finding");
         assert!(are_named(&found, &[(HallPlaces, Some(2.0))]), "{found:?}");
     }
 }
@@ -232,8 +235,8 @@ fn a_mistake_is_more_likely_where_nothing_else_describes_the_log() {
         "[[0.084, 0.0], [-0.084, 0.0], [0.0, -0.084]]",
     );
     let [_, dataset] = datasets(&stage, |_| ());
-    assert_eq!(structure(&dataset, &stage, false), None);
-    let found = structure(&dataset, &stage, true).expect("a finding");
+    assert_eq!(structure(&dataset, &stage, false, None), None);
+    let found = structure(&dataset, &stage, true, None).expect("a finding");
     assert_eq!(
         (found.code(), found.severity),
         (Code::ScaleWrong, Severity::Warn)
@@ -251,7 +254,7 @@ fn what_is_not_linear_is_no_mistake_with_channels() {
         s.hall[1] = i32::from((s.hall[1] + 32_768) as i16)
     });
     for dataset in folded.into_iter().chain(wrapped) {
-        let found = structure(&dataset, &stage, true).expect("a finding");
+        let found = structure(&dataset, &stage, true, None).expect("a finding");
         assert_eq!(
             (found.kind, found.channels),
             (Kind::NotLinear {}, vec![HallB])
@@ -267,8 +270,46 @@ fn two_mistakes_at_once_are_refused_without_a_name() {
         s.beams_nm[0] *= -1;
     });
     for dataset in two {
-        let found = structure(&dataset, &stage, false).expect("a finding");
+        let found = structure(&dataset, &stage, false, None).expect("a finding");
         assert!(matches!(found.kind, Kind::OtherProbes { .. }), "{found:?}");
         assert_eq!(found.severity, Severity::Refuse);
+    }
+}
+
+/// Without a range of eta in the stage file.
+#[test]
+fn a_reference_in_single_pass_for_double_pass_is_refused_by_the_sensitivities() {
+    let lines = STAGE_TOML.lines().filter(|line| !line.starts_with("eta_"));
+    let toml: Vec<&str> = lines.collect();
+    let open = Stage::from_toml(&toml.join("\n"), "stage.toml".as_ref()).expect("sound");
+    for dataset in datasets(&open, |s| s.beams_nm = s.beams_nm.map(|nm| nm / 2)) {
+        let found = structure(&dataset, &open, false, None).expect("a finding");
+        assert_eq!(found.severity, Severity::Refuse);
+        assert_eq!(causes(&found), [(Scale(vec![Channel::Beams]), Some(2.0))]);
+    }
+    for dataset in datasets(&open, |_| ()) {
+        assert_eq!(structure(&dataset, &open, false, None), None);
+    }
+}
+
+/// The slopes of the sensitivities show where the probes stand, the lever arms show it in units of the baseline.
+#[test]
+fn a_baseline_that_the_places_of_the_probes_contradict_is_named() {
+    for (baseline, factor) in [("0.08", Some(0.8)), ("0.12", Some(1.2)), ("0.101", None)] {
+        let stage = stage("y_baseline_m = 0.10", &format!("y_baseline_m = {baseline}"));
+        let dataset = recording(Protocol::Combined, 4)
+            .dataset(&stage)
+            .expect("a triangle");
+        let model = ModelChoice::Named(Model::from_kind(ModelKind::Field));
+        let fit = fit(&dataset, &stage, &FitSettings::new(model)).expect("a fit");
+        let known = (&fit.estimate.parameters, &fit.estimate.posterior.covariance);
+        let found = structure(&dataset, &stage, false, Some(known));
+        match factor {
+            Some(_) => {
+                let found = found.expect("a finding");
+                assert!(are_named(&found, &[(BaselineScale, factor)]), "{found:?}");
+            }
+            None => assert_eq!(found, None),
+        }
     }
 }

@@ -5,7 +5,6 @@ use hallstage_input::stage::Stage;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::dynamics::ARMS_M;
 use hallstage_solver::estimator::forecast::{Forecast, Forecaster};
-use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use hallstage_solver::estimator::whiten::Noise;
 use std::f64::consts::TAU;
@@ -19,11 +18,7 @@ pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
         drift: sensors.drift_per_root_s,
     };
     let [x, y, rz, z, rx, ry] = stage.motion.axes.map(|axis| axis.service);
-    Forecaster::new(
-        &FieldParameters::designed(stage),
-        &noise,
-        ([x, y, rz], [z, rx, ry]),
-    )
+    Forecaster::new(stage, &noise, ([x, y, rz], [z, rx, ry]))
 }
 
 /// The forecast for a run that is recorded every `period_s` and sampled here every `step_s`; `None` where

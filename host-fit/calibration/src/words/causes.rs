@@ -31,6 +31,19 @@ pub(super) fn mistake_remedy(code: Code, causes: &[Cause], may_be_magnets: bool)
         }
         false => code.entry().remedy,
     };
+    let is_other_pass = |cause: &Cause| {
+        let holds =
+            |[_, low, high]: [f64; 3]| [0.5, 2.0].iter().any(|by| (low..=high).contains(by));
+        cause.correction.is_scale_of_beams() && cause.values.is_some_and(holds)
+    };
+    if causes.iter().any(is_other_pass) {
+        let first = "check first whether each interferometer is read in single or in double pass. If the reference is right, write the \
+             sensitivities into [search] of stage.toml";
+        return match causes.len() {
+            1 => first.to_owned(),
+            _ => format!("{first}. Otherwise {what}"),
+        };
+    }
     let is_rough = causes.iter().any(|cause| cause.values.is_some());
     let rough = if is_rough {
         ". The values are rough: find the exact ones"

@@ -79,6 +79,11 @@ impl Correction {
         }
     }
 
+    /// Whether it is the scale of all beams.
+    pub fn is_scale_of_beams(&self) -> bool {
+        matches!(self, Self::Scale(some) if some[..] == [Channel::Beams])
+    }
+
     /// The unit of the value; empty for a factor.
     pub const fn unit(&self) -> &'static str {
         match self {

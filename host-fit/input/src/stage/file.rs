@@ -5,7 +5,10 @@
 
 use super::document::{Document, Value};
 use super::error::StageError;
-use super::{CodeScale, Probe, Stage, beams, columns, motion, paper_signs, search, temperature};
+use super::{
+    CodeScale, Probe, Stage, beams, certificate, columns, motion, paper_signs, search, temperature,
+    uncertainty,
+};
 use crate::source;
 use nalgebra::Matrix3;
 use runtime::capacitive::{ProbePositions, vertical_per_gap};
@@ -59,6 +62,7 @@ impl Stage {
         let document = &Document::parse(text, path)?;
         let probes = designed_probes(document)?;
         let capacitive = code_scale(document, "capacitive")?;
+        let uncertainty = uncertainty::uncertainty(document)?;
         let stage = Self {
             probes,
             hall: code_scale(document, "hall")?,
@@ -68,9 +72,11 @@ impl Stage {
             reset_sd: reset_sd(document)?,
             latency_s: latency_s(document)?,
             servo_period_s: document.required("servo", "period_s", PERIODS_S, "s")?,
-            search: search::ranges(document, &probes)?,
+            search: search::ranges(document, &probes, &uncertainty)?,
             motion: motion::motion(document)?,
             temperature: temperature::temperature(document)?,
+            uncertainty,
+            certificate: certificate::certificate(document)?,
             log: columns::log_layout(document)?,
         };
         Ok(stage)

@@ -8,6 +8,7 @@
 //!
 //! X = bx - hx Ry + y0 Rz and Y = (b1 + b2)/2 + hy Rx.
 
+use super::Input;
 use crate::rotation::rotation;
 use nalgebra::{Matrix3, Vector3};
 
@@ -68,6 +69,49 @@ impl Interferometer {
             .beams
             .map(|beams| beams.map(|beam| beam.place_m.into()));
         places.unwrap_or(on_axes)
+    }
+
+    /// This one with an error of one coordinate, one angle or the scale of its beams, one after the other, where the input
+    /// is of the beams.
+    pub fn with_error(&self, input: Input, error: f64) -> Vec<Self> {
+        const X: [f64; 3] = [1.0, 0.0, 0.0];
+        const Y1: [f64; 3] = [0.0, 1.0, 0.0];
+        const Y2: [f64; 3] = [0.0, 0.0, 1.0];
+        const BOTH: [f64; 3] = [0.0, 1.0, 1.0];
+        let on_axes = |beam: usize| Beam {
+            place_m: self.places_m()[beam].into(),
+            direction: Vector3::ith(usize::from(beam > 0), 1.0),
+        };
+        let beams = self.beams.unwrap_or([0, 1, 2].map(on_axes));
+        // The beams that are wrong, by how much, and along which axis.
+        let moves: &[([f64; 3], usize)] = match input {
+            Input::Baseline => &[([0.0, 0.5, -0.5], 0)],
+            Input::BeamPlaces => &[(X, 1), (X, 2), (BOTH, 0), (Y1, 2), (Y2, 2)],
+            Input::BeamAngles => &[(X, 1), (X, 2), (Y1, 0), (Y1, 2), (Y2, 0), (Y2, 2)],
+            Input::BeamScale => {
+                let scale = self.scale.map(|scale| scale * (1.0 + 1e-6 * error));
+                return vec![Self {
+                    scale,
+                    ..self.clone()
+                }];
+            }
+            _ => &[],
+        };
+        let moved = |(shares, axis): &([f64; 3], usize)| {
+            let mut beams = beams;
+            for (beam, share) in beams.iter_mut().zip(shares) {
+                let off = Vector3::ith(*axis, share * error);
+                match input {
+                    Input::BeamAngles => beam.direction = (beam.direction + off).normalize(),
+                    _ => beam.place_m += off,
+                }
+            }
+            Self {
+                beams: Some(beams),
+                ..self.clone()
+            }
+        };
+        moves.iter().map(moved).collect()
     }
 
     /// X, Y, Rz (m, m, rad) from the readings of the beams (m) and Z, Rx, Ry (m, rad, rad).

@@ -4,7 +4,7 @@
 use super::document::{Document, Value};
 use super::error::StageError;
 use super::file::COORDINATE_MAX_M;
-use super::{Probe, Range, SearchRanges, paper_signs};
+use super::{Input, Probe, Range, SearchRanges, Uncertainty, paper_signs};
 
 /// Largest sensible sensitivity: a probe that reads 100 times its designed scale is another probe.
 const ETA_MAX: f64 = 100.0;
@@ -21,8 +21,6 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const PLACE_M: f64 = 0.1;
 /// Usual misalignment at most.
 const THETA_DEG: f64 = 8.0;
-/// Usual sensitivities.
-const ETA: Range = Range::new(0.5, 1.5);
 /// Usual change of a sensitivity with height, 1/m: the field falls as the gap grows.
 const FALL_PER_M: Range = Range::new(-5000.0, 0.0);
 /// Usual zero deviation at most, m.
@@ -33,6 +31,7 @@ const DELTA_M: f64 = 1e-4;
 pub(super) fn ranges(
     document: &Document<'_>,
     designed: &[Probe; 3],
+    uncertainty: &Uncertainty,
 ) -> Result<SearchRanges, StageError> {
     let one = |name, most, unit, designed, default| -> Result<Range, StageError> {
         let ends = document.get("search", name);
@@ -49,7 +48,8 @@ pub(super) fn ranges(
     ];
     let delta_m = one("delta_m", DELTA_MAX_M, "m", None, about(0.0, DELTA_M))?;
     let mut ranges = SearchRanges::new(paper_signs(h_m), delta_m);
-    let eta = |name| one(name, ETA_MAX, "", None, ETA);
+    let usual = about(1.0, 2.0 * uncertainty.known(Input::Sensitivity));
+    let eta = |name| one(name, ETA_MAX, "", None, usual);
     ranges.set("eta", [eta("eta_a")?, eta("eta_b")?, eta("eta_c")?]);
     let default = about(0.0, THETA_DEG);
     let theta = one("theta_deg", THETA_MAX_DEG, "degrees", Some(0.0), default)?;

@@ -3,7 +3,7 @@
 
 use super::dynamics::Dynamics;
 use super::noise::{USUAL_DRIFT, white_m};
-use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
+use super::parameters::{FALL_PER_M, FieldParameters, place_m};
 use super::probe::probes;
 use super::rows::Rows;
 use super::terms::{COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
@@ -53,7 +53,7 @@ impl<'s> Alignment<'s> {
             for (deviation, term) in probe.iter_mut().zip(&TERMS) {
                 *deviation = term.prior.unwrap_or_default();
             }
-            probe[LEVER_ARM] = PLACE_M;
+            probe[LEVER_ARM] = place_m(stage);
             probe[THETA] = THETA_RAD;
             probe[ETA] = ETA_PART;
             probe[SLOPES] = FALL_PER_M.abs();

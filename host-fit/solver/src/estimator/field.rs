@@ -4,7 +4,7 @@
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT, drift, white_m, white_only};
-use super::parameters::{FieldParameters, HELD, unknowns};
+use super::parameters::{FieldParameters, HELD, place_m, unknowns};
 use super::posterior::{Posterior, temperature_errors};
 use super::probe::probes;
 use super::rows::Rows;
@@ -148,7 +148,7 @@ impl WhiteFit {
                 offsets: vec![[0.0; 3]; rows.movements.len()],
             },
             rows,
-            unknowns: unknowns(&places, sensors.deviations(), HELD),
+            unknowns: unknowns((&places, place_m(stage)), sensors.deviations(), HELD),
             temperature: dataset.temperature,
             sensors,
             places,
@@ -371,7 +371,8 @@ impl WhiteFit {
     fn under_white_noise(&mut self, stage: &Stage, limits: Limits) -> Result<(), FieldFitError> {
         self.noise = white_only(self.white_m(stage));
         if !self.shows_acceleration {
-            let open = unknowns(&self.places, self.sensors.deviations(), PER_ACCELERATION);
+            let places = (&self.places, place_m(stage));
+            let open = unknowns(places, self.sensors.deviations(), PER_ACCELERATION);
             let covariance = open.covariance(&self.normal()?);
             if covariance.is_some_and(|all| MotionFit::is_shown_by(&all)) {
                 self.unknowns = open;

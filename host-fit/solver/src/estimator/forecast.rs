@@ -1,13 +1,14 @@
 //! The posterior of a log that is not recorded yet: it does not depend on the residuals.
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION};
-use super::parameters::{FieldParameters, HELD, unknowns};
+use super::parameters::{FieldParameters, HELD, place_m, unknowns};
 use super::posterior::{Posterior, covariance_at, temperature_errors};
 use super::probe::probes;
 use super::rows::Rows;
 use super::service::{Service, ServiceVariance, service_poses};
 use super::temperature::Sensors;
 use super::whiten::{FieldEquations, Noise};
+use hallstage_input::stage::Stage;
 use nalgebra::DMatrix;
 
 /// The errors to expect of a fit to rows with signals that are not known yet.
@@ -32,23 +33,22 @@ pub struct TemperatureForecast {
 #[derive(Clone, Debug)]
 pub struct Forecaster {
     parameters: FieldParameters,
+    place_m: f64,
     noise: Noise,
     service: Service,
 }
 
 impl Forecaster {
-    /// For a stage of these parameters, with E = p = 0, under this noise, in service within the
+    /// For a stage as designed, with E = p = 0, under this noise, in service within the
     /// largest magnitudes of X, Y, Rz and Z, Rx, Ry given (m, rad); `None` where its probes don't
     /// determine a pose there.
-    pub fn new(
-        parameters: &FieldParameters,
-        noise: &Noise,
-        service: ([f64; 3], [f64; 3]),
-    ) -> Option<Self> {
+    pub fn new(stage: &Stage, noise: &Noise, service: ([f64; 3], [f64; 3])) -> Option<Self> {
+        let parameters = FieldParameters::designed(stage);
         Some(Self {
-            parameters: *parameters,
+            parameters,
+            place_m: place_m(stage),
             noise: *noise,
-            service: Service::new(parameters, noise.white_m, service_poses(service))?,
+            service: Service::new(&parameters, noise.white_m, service_poses(service))?,
         })
     }
 
@@ -92,6 +92,7 @@ impl Forecaster {
         let mut blocks = rows.evaluate(&probes(&self.parameters), &Dynamics::default(), &offsets);
         blocks.iter_mut().for_each(|block| block.rows *= weight);
         let places = self.parameters.places;
+        let drawn = (&places, self.place_m);
         let equations = FieldEquations {
             rows,
             places,
@@ -100,7 +101,7 @@ impl Forecaster {
             faults: &[],
         };
         let normal = equations.sum_blocks(&blocks);
-        let with = |acceleration| unknowns(&places, temperature, acceleration).covariance(&normal);
+        let with = |acceleration| unknowns(drawn, temperature, acceleration).covariance(&normal);
         match with(PER_ACCELERATION)? {
             open if MotionFit::is_shown_by(&open) => Some(open),
             _ => with(HELD),

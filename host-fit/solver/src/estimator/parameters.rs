@@ -9,7 +9,7 @@ use super::terms::{
 use super::whiten::{ACCELERATIONS, PROBE_LAGS, UNKNOWNS};
 use crate::estimator::gauss_newton::Unknowns;
 use crate::estimator::paper::Parameters;
-use hallstage_input::stage::Stage;
+use hallstage_input::stage::{Input, Stage};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use runtime::geometry::{ProbeGeometry, SensingAxes};
 use runtime::matrix::{from_rows, inverse, to_rows};
@@ -32,8 +32,6 @@ pub struct FieldParameters {
 pub const FALL_PER_M: f64 = -226.0;
 /// A probe with a smaller change of sensitivity, 1/m, is taken to stand at its designed place.
 const SLOPE_MIN: f64 = 5.0;
-/// How far a probe stands from its designed place along X and Y, standard deviation, m.
-pub(super) const PLACE_M: f64 = 0.03;
 
 impl FieldParameters {
     /// Model (31) as a field model: E = 0, p = 0.
@@ -71,7 +69,7 @@ impl FieldParameters {
         designed
     }
 
-    /// The parameters with these values: those of A, then of B, then of C.
+    /// The parameters with these values: A, then B, then C.
     pub fn from_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
@@ -246,7 +244,7 @@ fn powi(x: f64, n: i32) -> f64 {
 /// Where a probe stands, (x, y), m, and the derivatives of x by (a, c) and of y by (a, b). The
 /// vertical terms determine it: phi follows the height at the probe, a (Z + y Rx - x Ry), so that x = -c/a
 /// and y = b/a; where a is small the drawing does.
-pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+pub fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
     let [a, b, c] = [values[SLOPES], values[SLOPES + 1], values[SLOPES + 2]];
     let least = SLOPE_MIN * SLOPE_MIN;
     let share = 1.0 / (a * a + least);
@@ -258,12 +256,21 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
     ([x, y], [[by(-c, x), -a * share], [by(b, y), a * share]])
 }
 
+/// How far a probe stands from its designed place along X and Y, standard deviation, m.
+pub fn place_m(stage: &Stage) -> f64 {
+    stage.uncertainty.known(Input::ProbePlaces)
+}
+
 /// Standard deviation of a temperature coefficient (1/K) or a change by acceleration (m per m/s2) that stays at its prior.
 pub const HELD: f64 = 1e-12;
 
-/// All unknowns with their prior: `temperature` are the prior standard deviations of k and h, `acceleration` of the
-/// changes by acceleration.
-pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2], acceleration: f64) -> Unknowns {
+/// All unknowns with their prior. Standard deviations: `place_m` of the places of the probes, `temperature` of k and h,
+/// `acceleration` of the changes by acceleration.
+pub fn unknowns(
+    (places, place_m): (&[[f64; 2]; 3], f64),
+    temperature: [f64; 2],
+    acceleration: f64,
+) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {
         let own = probe * PER_PROBE;
@@ -273,7 +280,7 @@ pub fn unknowns(places: &[[f64; 2]; 3], temperature: [f64; 2], acceleration: f64
             }
         }
         // b - a y and c + a x are zero, each as well as the place is known.
-        let weight = 1.0 / (PLACE_M * FALL_PER_M * PLACE_M * FALL_PER_M);
+        let weight = 1.0 / (place_m * FALL_PER_M * place_m * FALL_PER_M);
         let a = own + SLOPES;
         for (slope, per_a) in [(a + 1, -y), (a + 2, *x)] {
             prior[(slope, slope)] += weight;

@@ -15,15 +15,15 @@ pub const SHAPE: usize = 18;
 pub(super) const SHAPE_UNIT_M: f64 = 1e-3;
 
 /// Place of the lever arm among the parameters of a probe.
-pub(super) const LEVER_ARM: usize = 0;
+pub const LEVER_ARM: usize = 0;
 /// Place of theta.
-pub(super) const THETA: usize = 1;
+pub const THETA: usize = 1;
 /// Place of eta.
-pub(super) const ETA: usize = 2;
+pub const ETA: usize = 2;
 /// Place of a, b, c.
-pub(super) const SLOPES: usize = 3;
+pub const SLOPES: usize = 3;
 /// Place of E.
-pub(super) const CARRY: usize = 6;
+pub const CARRY: usize = 6;
 /// Place of the coefficients of p.
 pub(super) const SHAPES: usize = 9;
 

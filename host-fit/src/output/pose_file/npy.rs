@@ -8,24 +8,29 @@
 //! rz_rad    <f4
 //! ```
 //!
-//! With uncertainties a record ends with `u_x_m`, `u_y_m`, `u_rz_rad`, `<f4`.
+//! With uncertainties a record ends with `u_x_m`, `u_y_m`, `u_rz_rad`, and with a budget `uc_x_m`, `uc_y_m`, `uc_rz_rad`,
+//! `<f4`.
 
 use super::PoseRow;
 
 const FIELDS: &str = "('movement', '<i8'), ('t_us', '<i8'), ('x_m', '<f4'), ('y_m', '<f4'), ('rz_rad', '<f4'), \
      ('z_m', '<f4'), ('rx_rad', '<f4'), ('ry_rad', '<f4'), ('status', '<u4')";
-const UNCERTAINTIES: &str = ", ('u_x_m', '<f4'), ('u_y_m', '<f4'), ('u_rz_rad', '<f4')";
+const UNCERTAINTIES: [&str; 6] = [
+    "u_x_m",
+    "u_y_m",
+    "u_rz_rad",
+    "uc_x_m",
+    "uc_y_m",
+    "uc_rz_rad",
+];
 
 /// Magic, version, and length of what follows.
 const START_BYTES: usize = 10;
 
 /// The header, as long for any number of rows: a multiple of 64 bytes.
-pub(super) fn header(rows: usize, with_uncertainties: bool) -> Vec<u8> {
-    let uncertainties = if with_uncertainties {
-        UNCERTAINTIES
-    } else {
-        ""
-    };
+pub(super) fn header(rows: usize, uncertainties: usize) -> Vec<u8> {
+    let names = UNCERTAINTIES[..uncertainties].iter();
+    let uncertainties: String = names.map(|name| format!(", ('{name}', '<f4')")).collect();
     let shape = format!("({rows},)");
     let described = format!(
         "{{'descr': [{FIELDS}{uncertainties}], 'fortran_order': False, 'shape': {shape:<24}, }}"
@@ -42,7 +47,7 @@ pub(super) fn header(rows: usize, with_uncertainties: bool) -> Vec<u8> {
 }
 
 /// Adds the record of a row.
-pub(super) fn record(bytes: &mut Vec<u8>, row: &PoseRow, uncertainty: Option<[f64; 3]>) {
+pub(super) fn record(bytes: &mut Vec<u8>, row: &PoseRow, uncertainties: &[f64]) {
     bytes.extend(row.movement.to_le_bytes());
     bytes.extend(row.t_us.to_le_bytes());
     let planar = row.reading.pose.planar.to_array();
@@ -51,7 +56,7 @@ pub(super) fn record(bytes: &mut Vec<u8>, row: &PoseRow, uncertainty: Option<[f6
         bytes.extend(word.to_le_bytes());
     }
     bytes.extend(row.reading.status.bits().to_le_bytes());
-    for u in uncertainty.iter().flatten() {
+    for u in uncertainties {
         bytes.extend((*u as f32).to_le_bytes());
     }
 }

@@ -1,12 +1,11 @@
 //! From a log to its pose file, in little memory however long they are.
 
 use super::commanded::Commanded;
-use super::{PoseRow, StatusCounts, npy, text, uncertainty};
+use super::{KnownErrors, PoseRow, StatusCounts, npy, text};
 use crate::output::{Output, OutputError};
 use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
-use hallstage_solver::estimator::posterior::Posterior;
 use runtime::{AnyDecoder, MotionCorrection, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 
@@ -33,7 +32,7 @@ pub struct DecodeSettings<'a> {
     /// The correction by commanded motion, for a log that holds the commanded pose.
     pub correction: Option<&'a MotionCorrection>,
     /// What is known of the decoder's errors, where uncertainties are to be written.
-    pub posterior: Option<&'a Posterior>,
+    pub known: Option<&'a KnownErrors>,
     /// How poses are written.
     pub format: PoseFormat,
     /// Shows how far the decoding is, and can end it.
@@ -42,18 +41,19 @@ pub struct DecodeSettings<'a> {
 
 impl DecodeSettings<'_> {
     fn header(&self, rows: usize) -> Vec<u8> {
+        let uncertainties = self.known.map_or(0, KnownErrors::count);
         match self.format {
-            PoseFormat::Csv => text::header(self.posterior.is_some()),
-            PoseFormat::Npy => npy::header(rows, self.posterior.is_some()),
+            PoseFormat::Csv => text::header(uncertainties),
+            PoseFormat::Npy => npy::header(rows, uncertainties),
         }
     }
 
     fn write(&self, row: &PoseRow, bytes: &mut Vec<u8>) {
-        let known = self.posterior;
-        let uncertainty = known.map(|known| uncertainty::uncertainty(&row.reading, known));
+        let uncertainties = self.known.map(|known| known.at(&row.reading));
+        let uncertainties = uncertainties.unwrap_or_default();
         match self.format {
-            PoseFormat::Csv => text::line(bytes, row, uncertainty),
-            PoseFormat::Npy => npy::record(bytes, row, uncertainty),
+            PoseFormat::Csv => text::line(bytes, row, &uncertainties),
+            PoseFormat::Npy => npy::record(bytes, row, &uncertainties),
         }
     }
 }

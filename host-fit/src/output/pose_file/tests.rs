@@ -26,9 +26,8 @@ fn decode(dataset: &Dataset, decoder: &AnyDecoder, on_invalid: OnInvalid) -> Vec
 }
 
 fn to_text(rows: &[PoseRow]) -> Vec<u8> {
-    let mut bytes = text::header(false);
-    rows.iter()
-        .for_each(|row| text::line(&mut bytes, row, None));
+    let mut bytes = text::header(0);
+    rows.iter().for_each(|row| text::line(&mut bytes, row, &[]));
     bytes
 }
 
@@ -156,7 +155,7 @@ fn settings(decoder: &AnyDecoder, on_invalid: OnInvalid, format: PoseFormat) -> 
         decoder,
         on_invalid,
         correction: None,
-        posterior: None,
+        known: None,
         format,
         watch: Watch::NONE,
     }
@@ -190,7 +189,7 @@ fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
         assert!(read == rows && read.iter().map(words).eq(rows.iter().map(words)));
         assert_eq!(counts, counted(&rows));
         let (array, _) = decoded_file(&logs[0], on_invalid, PoseFormat::Npy);
-        let header = npy::header(rows.len(), false);
+        let header = npy::header(rows.len(), 0);
         assert_eq!(header.len() % 64, 0);
         let (start, records) = array.split_at(header.len());
         assert!(start == header && start.starts_with(b"\x93NUMPY\x01\x00"));

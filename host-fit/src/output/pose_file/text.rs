@@ -2,8 +2,15 @@
 
 use super::{HEADER, PoseRow};
 
-/// What uncertainties add to the first line.
-const UNCERTAINTIES: &str = ",u_x_um,u_y_um,u_rz_urad";
+/// Names of the uncertainties in the first line.
+const UNCERTAINTIES: [&str; 6] = [
+    "u_x_um",
+    "u_y_um",
+    "u_rz_urad",
+    "uc_x_um",
+    "uc_y_um",
+    "uc_rz_urad",
+];
 
 /// Exponents of the first digit within the table of powers.
 const EXPONENTS: std::ops::Range<i32> = -12..9;
@@ -14,18 +21,14 @@ const POWERS: [f64; 33] = [
     1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
 ];
 
-/// The first line.
-pub(super) fn header(with_uncertainties: bool) -> Vec<u8> {
-    let uncertainties = if with_uncertainties {
-        UNCERTAINTIES
-    } else {
-        ""
-    };
-    format!("{HEADER}{uncertainties}\n").into_bytes()
+/// The first line, with so many uncertainties.
+pub(super) fn header(uncertainties: usize) -> Vec<u8> {
+    let names = [&[HEADER], &UNCERTAINTIES[..uncertainties]].concat();
+    format!("{}\n", names.join(",")).into_bytes()
 }
 
-/// Adds the line of a row, with the standard uncertainty of X, Y, Rz (m, m, rad) if there is one.
-pub(super) fn line(bytes: &mut Vec<u8>, row: &PoseRow, uncertainty: Option<[f64; 3]>) {
+/// Adds the line of a row, with standard uncertainties of X, Y, Rz (m, m, rad).
+pub(super) fn line(bytes: &mut Vec<u8>, row: &PoseRow, uncertainties: &[f64]) {
     let reading = &row.reading;
     integer(bytes, row.movement);
     bytes.push(b',');
@@ -41,7 +44,7 @@ pub(super) fn line(bytes: &mut Vec<u8>, row: &PoseRow, uncertainty: Option<[f64;
     }
     bytes.push(b',');
     integer(bytes, reading.status.bits());
-    for u in uncertainty.iter().flatten() {
+    for u in uncertainties {
         bytes.extend(format!(",{:.3e}", u * 1e6).bytes());
     }
     bytes.push(b'\n');

@@ -93,7 +93,7 @@ impl Estimate {
         faults: &[Vec<[f64; 3]>],
     ) -> Option<Self> {
         let size = UNKNOWNS + faults.len();
-        let mut prior = unknowns(&places, [HELD; 2], means.acceleration).prior;
+        let mut prior = unknowns((&places, means.place_m), [HELD; 2], means.acceleration).prior;
         let flat = (0..COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31);
         for k in flat.chain([LAG]) {
             prior[(k, k)] += 1.0 / (FLAT * FLAT);

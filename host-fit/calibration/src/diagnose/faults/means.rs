@@ -6,7 +6,7 @@ use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_input::statistics::median;
 use hallstage_solver::estimator::dynamics::{Dynamics, PER_ACCELERATION};
-use hallstage_solver::estimator::parameters::{FieldParameters, HELD};
+use hallstage_solver::estimator::parameters::{FieldParameters, HELD, place_m};
 use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::rows::Rows;
 use hallstage_solver::estimator::terms::COUNT;
@@ -27,6 +27,8 @@ pub(super) struct Means {
     pub(super) white_m: [f64; 3],
     /// Errors of the resets, m, m, rad, where they are declared.
     pub(super) resets: Option<[f64; 3]>,
+    /// Prior standard deviation of the places of the probes, m.
+    pub(super) place_m: f64,
     /// Prior standard deviation of what acceleration adds to the readings, m per m/s2.
     pub(super) acceleration: f64,
 }
@@ -88,6 +90,7 @@ impl Means {
             first,
             white_m,
             resets: stage.reset_sd,
+            place_m: place_m(stage),
             acceleration: if shows_acceleration {
                 PER_ACCELERATION
             } else {
