@@ -1,6 +1,7 @@
 //! The faults of a log, one after the other as long as they explain more than chance.
 
 use super::estimate::Estimate;
+use super::motion::Follows;
 use super::score::{Fault, Scan};
 use super::slow::{misfit, noisy_beam};
 use super::{FAULTS_MAX, Finder};
@@ -26,10 +27,14 @@ impl Finder<'_> {
             // A large fault bends the effects of the others, too.
             let next = self.refitted(estimate, &with);
             let next = next.and_then(|next| self.refitted(&next, &with));
-            // It explains more than what remains, and most of the noise of a beam.
+            // It explains more than what remains, and most of the noise of a beam, which makes accelerations of its own.
+            let follows = best.suspect.follows;
             let explains = |next: &Estimate| {
                 let (before, after) = (estimate.chi_squared, next.chi_squared);
-                let is_noise = || noisy_beam(&self.effects(estimate), estimate).is_some();
+                let is_noise = || {
+                    matches!(follows, Follows::Acceleration(_) | Follows::OwnAcceleration)
+                        || noisy_beam(&self.effects(estimate), estimate).is_some()
+                };
                 before - after > needs * misfit(&self.means, next)
                     && (before - after > after - self.means.freedom() || !is_noise())
             };
