@@ -1,6 +1,5 @@
 //! Findings about the fit itself.
 
-use super::limits::severity_of_share;
 use crate::fit::Fit;
 use crate::judge::identify::{FitFailure, check_described};
 use crate::judge::predicted::Predicted;
@@ -8,29 +7,9 @@ use crate::judge::statistics;
 use crate::judge::verdict;
 use crate::words;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Finding, Kind, Place, Severity};
+use hallstage_input::finding::{Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
 use runtime::ModelKind;
-
-/// The rows that count less than half in a fit, where they are more than a few.
-pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
-    let left_out = fit.fitted.left_out(dataset);
-    let severity = severity_of_share(left_out.share());
-    let (first, last) = left_out.span.filter(|_| severity > Severity::Note)?;
-    let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
-    let end = Place {
-        movement: to,
-        t_us: last.t_us,
-    };
-    let kind = Kind::LeftOut {
-        rows: left_out.rows,
-        of: left_out.of,
-        percent: 100.0 * left_out.share(),
-        end,
-    };
-    let found = Finding::new(kind).with_severity(severity);
-    Some(found.with_place(from, first.t_us))
-}
 
 /// Movements so short that their zero deviations make the errors too small: each zero deviation fits one row.
 pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {

@@ -277,10 +277,6 @@ impl Diagnosis {
     /// Adds the findings about the fit that no fault explains.
     fn add_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
         let findings = &mut self.findings;
-        // A fault explains the rows that are left out.
-        if self.repair.is_none() {
-            findings.extend(fit_checks::left_out(fit, dataset));
-        }
         findings.extend(fit.warnings(dataset, stage));
         let predicted = self.predicted.as_ref();
         let late = late::late_reference(fit, self.repair.as_ref(), findings, stage, predicted);

@@ -1,6 +1,5 @@
 //! The rows of a fit, and how much each counts.
 
-use crate::judge::left_out::{LeftOut, RowPlace};
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_solver::estimator::robust::{HALF, Loss};
 
@@ -54,21 +53,5 @@ impl FittedRows {
             all[row] = weight;
         }
         all
-    }
-
-    /// How many rows count less than half, and where they are.
-    pub fn left_out(&self, dataset: &Dataset) -> LeftOut {
-        let mut left_out = LeftOut::default();
-        for (&row, weight) in self.numbers.iter().zip(&self.weights) {
-            let row = &dataset.rows[row];
-            let movement = &dataset.movements[row.movement];
-            let place = RowPlace {
-                log: movement.log,
-                movement: movement.index,
-                t_us: row.t_us,
-            };
-            left_out.take(place, *weight < HALF);
-        }
-        left_out
     }
 }

@@ -20,7 +20,6 @@
 pub mod identify;
 pub mod in_motion;
 mod judgement;
-pub mod left_out;
 pub mod precision;
 pub mod predicted;
 pub mod statistics;

@@ -3,7 +3,7 @@
 use super::causes::mistake;
 use super::finding::is_late_sensor;
 use hallstage_input::axis::{counted, sign};
-use hallstage_input::finding::{Finding, Kind, Place, Quantity, TimeCourse};
+use hallstage_input::finding::{Finding, Kind, Quantity, TimeCourse};
 
 /// Names in a list at most.
 const NAMED_MAX: usize = 10;
@@ -94,9 +94,6 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::Mistake { causes, is_sure, may_be_magnets, .. } => mistake(causes, *is_sure, *may_be_magnets),
         Kind::OtherProbes { tolerances } => {
             format!("the fitted probes differ from stage.toml by {tolerances:.1} times the tolerances of directions, sensitivities and places, and no single mistake explains it")
-        }
-        Kind::LeftOut { rows, of, percent, end: Place { movement, t_us } } => {
-            format!("{rows} of {of} rows ({percent:.1} %) are so far from the fitted model that they count little or nothing in the fit; the last is in movement {movement} at t_us = {t_us}. With --loss none every row counts")
         }
         Kind::ShortMovements { mean_rows, hidden_percent } => {
             format!("the movements have {mean_rows:.1} rows on average. Each has a zero deviation of its own, which hides about {hidden_percent:.0} % of the errors")

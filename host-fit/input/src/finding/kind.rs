@@ -1,6 +1,6 @@
 //! What a finding measured.
 
-use super::{Code, Place};
+use super::Code;
 use crate::channel::Channel;
 
 /// The quantity of a channel that changes.
@@ -201,8 +201,6 @@ kinds! {
     OtherProbes { tolerances: f64 } => Code::TermsAtLimit;
 
     // Of a fit.
-    /// Rows that count less than half; `end` is the last of them.
-    LeftOut { rows: usize, of: usize, percent: f64, end: Place } => Code::LeftOut, *rows as f64, "rows";
     /// Rows of a movement on average, and the part of the errors that its zero deviation hides.
     ShortMovements { mean_rows: f64, hidden_percent: f64 } => Code::ShortMovements, *mean_rows, "rows";
     /// The model is not the field model. Ranges of the errors in service of X, Y, Rz.

@@ -77,16 +77,15 @@ codes! {
     Drift, "drift", Warn, "the zero of a channel drifts", "let the stage and its electronics warm up", [TermsAtLimit ZeroClipped], Kept, WARN;
     GainDrift, "gain_drift", Warn, "the gain of a channel changes", "let the channel warm up, and check its supply", [TermsAtLimit], Kept, WARN;
     Step, "step", Warn, "the zero of a channel jumps and stays there", "record the movement again", [TermsAtLimit ZeroClipped], Kept, WARN;
-    Stuck, "stuck", Warn, "a channel stands still while the others move", "check the cable, the register and the drive, and leave these rows out", [TermsAtLimit ZeroClipped Step LeftOut], Kept, WARN;
+    Stuck, "stuck", Warn, "a channel stands still while the others move", "check the cable, the register and the drive, and leave these rows out", [TermsAtLimit ZeroClipped Step], Kept, WARN;
     IdleMovement, "idle_movement", Warn, "nothing moves in a movement", "leave it out, or record it again", [], Kept, WARN;
-    Saturated, "saturated", Warn, "codes stand at the end of a converter's range", "reduce the gain or the motion", [TermsAtLimit ZeroClipped LogsDisagree LeftOut], LostOfSensors, WARN;
+    Saturated, "saturated", Warn, "codes stand at the end of a converter's range", "reduce the gain or the motion", [TermsAtLimit ZeroClipped LogsDisagree], LostOfSensors, WARN;
     Overflow, "overflow", Refuse, "a counter of a channel overflows", "read the channel with more bits, or unwrap it before the log is written", [ChannelInverted ScaleWrong Step GainDrift], Kept, WARN;
     StuckBit, "stuck_bit", Warn, "a bit of a code never changes, so that steps are missing", "check the converter and its bus; in service the missing steps make the pose wrong", [Hum GainDrift], Lost, WARN;
     Coarse, "coarse", Warn, "a channel is written in steps that are larger than the noise", "write more digits, or use a converter with more bits", [], Lost, WARN;
     Slow, "slow", Warn, "a channel is sampled at a lower rate, averaged or low-pass filtered", "record each channel in each servo period, and turn filters and averaging off", [Hum ReferenceLag Step GainDrift Drift Stuck], Lost, WARN;
     Noisy, "noisy", Warn, "a channel has more noise than the others of its kind, or more at times", "check its cable, shield, supply and reading", [], Lost, WARN;
     Outliers, "outliers", Warn, "rows are far outside the noise", "look for lost pulses, sparks and wrong bits", [], Kept, WARN;
-    LeftOut, "left_out", Warn, "many rows count less than half in the fit", "find out what happened there and record again", [], Kept, WARN;
     ShortMovements, "short_movements", Warn, "movements are so short that their own zero deviations hide errors", "check the times and the movement column", [], Kept, WARN;
     RowsMissing, "rows_missing", Warn, "servo periods have no row, or a draw has no row of a movement", "use a recorder that keeps up, or a larger --train", [], Kept, None;
     Jitter, "jitter", Warn, "rows come at uneven times, or at another rate than the servo's", "have one clock start all converters and stamp the rows", [], Kept, None;
