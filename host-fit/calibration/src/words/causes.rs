@@ -58,11 +58,13 @@ fn cause(cause: &Cause) -> String {
     let Some(values) = cause.values else {
         return what;
     };
-    // A factor has two digits.
+    // A factor has two digits, and its distance from 1 has one.
     let is_factor = cause.correction.unit().is_empty();
+    let place = |value: f64| value.log10().floor() as i32;
     let shown = |value: f64| {
+        let from_one = (value - 1.0).abs().max(1e-3);
         let digits = match is_factor {
-            true => 1 - value.log10().floor() as i32,
+            true => (1 - place(value)).max(-place(from_one)),
             false => 0,
         };
         let place = 10f64.powi(-digits);
@@ -106,4 +108,24 @@ fn correction(correction: &Correction) -> String {
 fn titles(channels: &[Channel]) -> String {
     let titles: Vec<&str> = channels.iter().map(|channel| channel.title()).collect();
     titles.join(" and ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_shows_how_far_it_is_from_one() {
+        for (factor, shown) in [
+            (1.0526, "1.05"),
+            (0.952, "0.95"),
+            (2.04, "2.0"),
+            (0.497, "0.50"),
+        ] {
+            let values = Some([factor; 3]);
+            let correction = Correction::Scale(vec![Channel::BeamX]);
+            let said = cause(&Cause { correction, values });
+            assert!(said.ends_with(&format!("about {shown}")), "{said}");
+        }
+    }
 }

@@ -176,7 +176,7 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         ("h1x_m = 0.1975\n", "", 2, 1, "hall.h1x_m", "missing; add it"),
         // Decimal commas: four numbers in place of two.
         ("[0.78, 0.98]", "[0,78, 0,98]", 32, 9, "search.eta_a", "write it like `eta_a = [0.78, 0.98]`"),
-        ("# a note", "serial = 7", 1, 1, "serial", "capacitive, hall"),
+        ("# a note", "serial = 7", 1, 1, "serial", "capacitive, certificate, hall"),
         ("delta_m", "eta_d", 39, 1, "search.eta_d", "eta_c, h1x_m"),
         // Another kind of value.
         ("= 0.40", "= \"0.40\"", 4, 9, "hall.h1y_m", "does not fit; write it like `h1y_m = 0.40`"),
