@@ -255,14 +255,15 @@ pub fn recalibrate(
         known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
     let temperature = set.constants.temperature.rounded();
     let of_posterior = (&update.parameters, &update.posterior);
-    let budget = predicted
-        .as_ref()
+    let diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted));
+    // With what the sensors add in service.
+    let budget = (diagnosis.predicted.as_ref())
         .filter(|_| known.is_some())
         .and_then(|of| Budget::new(stage, of_posterior, &temperature, of, update.residuals));
     let diagnosis = Diagnosis {
         validity,
         budget,
-        ..diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted))
+        ..diagnosis
     };
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
     let fit = FitRecord {

@@ -8,7 +8,7 @@
 //! let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
 //! // `log::read` reads files.
 //! let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
-//! assert_eq!(reading.dataset.rows.len(), 15_000);
+//! assert_eq!(reading.dataset.rows.len(), 15_001);
 //! assert_eq!(reading.dataset.movements.len(), 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -4,7 +4,7 @@ use super::stage::Stage;
 
 /// 57,000 rows of the paper's protocol, gzip-compressed CSV.
 pub const LOG_GZ: &[u8] = include_bytes!("../../data/paper.csv.gz");
-/// 15,000 rows of the same stage: one run of 30 s, all six axes moving at once.
+/// 15,001 rows of the same stage: one run of 30 s, all six axes moving at once.
 pub const RUN_GZ: &[u8] = include_bytes!("../../data/run30.csv.gz");
 /// 8,000 rows of the same stage in service, with its true pose as reference.
 pub const SERVICE_GZ: &[u8] = include_bytes!("../../data/service.csv.gz");

@@ -5,8 +5,8 @@
 //! | [`model`] | the models: the terms that each fits |
 //! | [`terms`] | the 81 parameters of the field model: names, units, prior |
 //! | [`parameters`] | their values, and the decoder's constants |
+//! | `paper_terms` | the 18 terms of the paper: names, units, which model has them |
 //! | [`paper`] | the 18 parameters of Models (12) to (31), and their search ranges |
-//! | [`motion`] | the motions that show a parameter |
 //! | [`draw`] | the rows that a fit draws |
 //! | [`rows`] | the rows of a log |
 //! | `derivatives` | acceleration from rows |

@@ -20,7 +20,7 @@ pub struct Model {
     pub summary: &'static str,
     /// Its tag in the blob.
     pub kind: ModelKind,
-    /// How many of the terms [`MODEL_31`] are fitted; the others keep [`Term::fixed`].
+    /// How many of the terms [`MODEL_31`] are fitted; the others keep [`PaperTerm::fixed`].
     pub fitted: usize,
     /// Whether each movement of a log has a zero deviation of its own.
     pub has_zero_deviation: bool,

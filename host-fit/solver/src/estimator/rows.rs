@@ -39,7 +39,7 @@ pub struct FieldRow {
     pub reference: [f64; 3],
     /// Change of X, Y, Rz by the reference and of Z, Rx, Ry by time: m/s, rad/s.
     pub rate: [f64; 6],
-    /// Acceleration along X, Y, of Rz at [`ARM_M`], along Z, of Rx and Ry there, m/s2; 0 where rows are missing.
+    /// Acceleration along X, Y, of Rz at [`ARM_M`](super::dynamics::ARM_M), along Z, of Rx and Ry there, m/s2; 0 where rows are missing.
     pub acceleration_m_s2: [f64; 6],
     /// dM and dH over the gain of A, B, C that [`Self::signal_m`] is compensated for, K.
     pub temperature_k: [[f64; 2]; 3],

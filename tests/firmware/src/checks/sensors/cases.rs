@@ -88,7 +88,8 @@ impl Case {
         Self {
             within: periods,
             wrong: periods - 1,
-            back_within: 1,
+            // The noise of a gap is one code: it repeats the frozen code now and then.
+            back_within: 4,
             ..Self::new(name, fault_of_codes, &[fault(0x20 + k as u8), NOT_READY])
         }
     }
