@@ -25,7 +25,7 @@ const REST: f64 = 1.0;
 
 /// Rows that follow each other in one movement.
 #[derive(Debug)]
-struct Run {
+struct SampledRun {
     log: usize,
     /// Number of its movement.
     index: i64,
@@ -38,7 +38,7 @@ struct Run {
 
 /// A log while it is read.
 #[derive(Debug)]
-struct Log {
+struct SampledLog {
     /// Runs at places below this are kept.
     share: f64,
     /// Number of runs that move, and that stand still.
@@ -48,12 +48,12 @@ struct Log {
     movements: usize,
 }
 
-impl Log {
+impl SampledLog {
     const fn is_whole(&self) -> bool {
         self.share == f64::INFINITY
     }
 
-    fn keeps(&self, run: &Run) -> bool {
+    fn keeps(&self, run: &SampledRun) -> bool {
         let [moving, _] = self.counts;
         let is_wanted = moving == 0 || !run.stands_still;
         self.is_whole() || (run.place < self.share && is_wanted)
@@ -65,9 +65,9 @@ impl Log {
 pub(super) struct Sampler {
     rows_max: usize,
     rows: Vec<Row>,
-    runs: Vec<Run>,
+    runs: Vec<SampledRun>,
     /// The logs that were read, and the log in hand.
-    logs: Vec<Log>,
+    logs: Vec<SampledLog>,
     sources: Vec<LogSource>,
     /// Number of rows that is too large.
     too_many: usize,
@@ -89,7 +89,7 @@ impl Sampler {
 
     /// A log begins.
     pub(super) fn begin_log(&mut self) {
-        self.logs.push(Log {
+        self.logs.push(SampledLog {
             share: f64::INFINITY,
             counts: [0; 2],
             rows: 0,
@@ -101,7 +101,7 @@ impl Sampler {
     pub(super) fn push(&mut self, index: i64, begins: bool, row: &Row) {
         if begins || self.runs.last().is_none_or(|run| run.rows.len() == RUN) {
             self.end_run();
-            self.runs.push(Run {
+            self.runs.push(SampledRun {
                 log: self.logs.len().saturating_sub(1),
                 index,
                 begins,

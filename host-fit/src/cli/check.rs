@@ -1,7 +1,7 @@
 //! `host-fit check`.
 
 use super::arguments::{Json, Logs};
-use super::fit::Job;
+use super::fit::FitJob;
 use super::interrupt;
 use super::report::ReportArgs;
 use crate::calibrate::{ErrorLimits, FitOrder};
@@ -34,7 +34,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     }
     let mut settings = FitSettings::new(ModelChoice::Auto);
     settings.options.watch = interrupt::watch();
-    let job = Job {
+    let job = FitJob {
         title: "Check of a log",
         order: FitOrder {
             settings,

@@ -50,7 +50,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     }
     let created = args.report.created.clone().unwrap_or_default();
     let order = args.options.order(created, interrupt::watch());
-    let job = Job {
+    let job = FitJob {
         title: CERTIFICATE,
         order: order.map_err(HostError::from_mismatch)?,
         out: Some(&args.out),
@@ -59,7 +59,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
 }
 
 /// What `fit` and `check` do.
-pub(super) struct Job<'a> {
+pub(super) struct FitJob<'a> {
     /// Title of the page.
     pub(super) title: &'static str,
     pub(super) order: FitOrder,
@@ -67,7 +67,7 @@ pub(super) struct Job<'a> {
     pub(super) out: Option<&'a Path>,
 }
 
-impl Job<'_> {
+impl FitJob<'_> {
     /// Reads, fits, judges; then writes JSON, report and blob, in this order.
     pub(super) fn run(
         &self,

@@ -43,13 +43,13 @@ const QUANTITIES: [Quantity; 11] = [
 pub(super) const PLANAR: [&str; 3] = [QUANTITIES[0].0, QUANTITIES[1].0, QUANTITIES[2].0];
 
 /// A log, and what is shown of it over time: row after row, without the gaps between them.
-pub(super) struct Log<'a> {
+pub(super) struct PlottedLog<'a> {
     pub(super) dataset: &'a Dataset,
     /// Time between rows, s.
     pub(super) period_s: f64,
 }
 
-impl Log<'_> {
+impl PlottedLog<'_> {
     /// Where movements begin, unless their borders would merge.
     fn borders(&self) -> Mark {
         let starts = self.dataset.movements.iter().skip(1).map(|m| m.rows.start);

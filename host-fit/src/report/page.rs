@@ -1,7 +1,7 @@
 //! The report of logs and what was made of them as one HTML page, written whether or not there is a
 //! calibration: a certificate first, then what it rests on.
 
-use super::charts::Log;
+use super::charts::PlottedLog;
 use super::errors::{RowErrors, designed, error_table, to_micro};
 use super::html::{Cause, Page, Section};
 use super::parameters;
@@ -10,7 +10,7 @@ use super::result::Report;
 use super::table::Table;
 use super::text::file_name;
 use super::trusted::reference;
-use super::verdict::{Subject, Summary};
+use super::verdict::{End, Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::{PoseError, white_noise};
 use hallstage_calibration::words;
@@ -92,7 +92,7 @@ impl Source<'_> {
     /// [`Error`] as in [`Page::html`].
     pub fn html(&self) -> Result<String, Error> {
         let (stage, dataset) = (self.stage, self.dataset);
-        let log = Log {
+        let log = PlottedLog {
             dataset,
             period_s: (dataset.period_s(0..dataset.rows.len())).unwrap_or(stage.servo_period_s),
         };
@@ -105,7 +105,9 @@ impl Source<'_> {
             tables: vec![self.provenance.0.clone()],
             ..Section::default()
         });
-        let is_certificate = self.title != CERTIFICATE || self.missing().is_empty();
+        let is_refused = matches!(self.subject.end, End::Failed(_));
+        let is_whole = self.missing().is_empty() && !is_refused;
+        let is_certificate = self.title != CERTIFICATE || is_whole;
         let [number, ..] = &stage.certificate.texts;
         let title = if is_certificate { self.title } else { REPORT };
         let page = Page {
@@ -216,7 +218,7 @@ impl Source<'_> {
     }
 
     /// Errors, parameters, movements and all other figures.
-    fn sections(&self, log: &Log, report: &Report) -> [Section; 5] {
+    fn sections(&self, log: &PlottedLog, report: &Report) -> [Section; 5] {
         let noise = white_noise(&report.by_row, &self.dataset.movements);
         let after = format!("after: {}", Model::from_kind(report.set.model).title());
         let (what, before) = match &self.as_found {

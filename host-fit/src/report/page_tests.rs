@@ -168,14 +168,17 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
         ],
         ..Diagnosis::default()
     };
-    let page = |stage: &Stage| {
-        let subject = subject(End::Written, &diagnosis);
+    let ended = |stage: &Stage, end| {
+        let subject = subject(end, &diagnosis);
         source(stage, &dataset, subject).html().expect("a page")
     };
+    let page = |stage: &Stage| ended(stage, End::Written);
     assert!(page(&stage).contains("<h1>Calibration report</h1>"));
     stage.certificate.texts = TEXTS.map(|key| format!("of \"</{key}>"));
     let full = page(&stage);
     assert!(full.contains("<h1>Calibration certificate</h1>"));
+    let refused = ended(&stage, End::Failed(&Refusal::Findings));
+    assert!(refused.contains("<h1>Calibration report</h1>"));
     // On the foot of each page.
     assert!(full.contains("of\\20 \\22 \\3c \\2f number\\3e "), "{full}");
     assert!(!full.contains("\"</number>") && full.contains("counter(pages)"));
