@@ -76,7 +76,7 @@ impl InMotion {
             acceleration_m_s2: self.acceleration_m_s2,
             speed_mm_s: self.speed_m_s * 1e3,
             shows_acceleration: self.fit.shows_acceleration,
-            lag_us: self.fit.dynamics.probe_lag_s.map(|lag_s| lag_s * 1e6),
+            lag_us: self.fit.lags_behind_middle_s().map(|lag_s| lag_s * 1e6),
         };
         is_felt.then(|| Finding::new(kind).with_cost(ratio))
     }

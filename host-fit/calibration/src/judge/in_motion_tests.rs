@@ -129,8 +129,11 @@ fn probes_that_are_late_by_the_same_time_are_told_with_their_cost() {
 }
 
 #[test]
-fn one_late_probe_is_named_and_stays_late_in_service() {
-    let (_, _, diagnosis, _) = calibrated(MotionEffects::draw([1e-3, 0.0, 0.0], None, None, SEED));
+fn one_late_probe_is_named_stays_late_in_service_and_is_corrected() {
+    let (stage, sound, _, fast) = calibrated(MotionEffects::NONE);
+    let [_, floor] = errors(&stage, &sound, &fast);
+    let (stage, late, diagnosis, fast) =
+        calibrated(MotionEffects::draw([1e-3, 0.0, 0.0], None, None, SEED));
     let codes: Vec<Code> = diagnosis.findings.iter().map(Finding::code).collect();
     assert_eq!(codes, [Code::Motion, Code::ReferenceLag]);
     let named = crate::words::message(&diagnosis.findings[1]);
@@ -139,4 +142,10 @@ fn one_late_probe_is_named_and_stays_late_in_service() {
         "{named}"
     );
     assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
+    // The two other probes keep their time.
+    let [corrected, _] = errors(&stage, &late, &fast);
+    for axis in 0..3 {
+        let cost = corrected[axis] / floor[axis];
+        assert!(cost < 1.03, "{axis}: {cost}");
+    }
 }

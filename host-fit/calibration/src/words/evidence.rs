@@ -139,7 +139,7 @@ pub(super) fn evidence(found: &Finding) -> String {
                 true => (format!(", and {corrected_ratio:.2} times with the correction by commanded speed and acceleration"), ""),
                 false => (String::new(), ". The log does not show what acceleration does to the probes"),
             };
-            format!("in the motion that [motion] in stage.toml declares for service, errors are {ratio:.2} times the noise floor{corrected}. Uncorrected errors are good up to {acceleration_m_s2:.2} m/s² and {speed_mm_s:.1} mm/s rms. Probes A, B, C are read {a:.0}, {b:.0}, {c:.0} µs after their mean{known}")
+            format!("in the motion that [motion] in stage.toml declares for service, errors are {ratio:.2} times the noise floor{corrected}. Uncorrected errors are good up to {acceleration_m_s2:.2} m/s² and {speed_mm_s:.1} mm/s rms. Probes A, B, C are read {a:.0}, {b:.0}, {c:.0} µs after the middle probe{known}")
         }
         Kind::BeyondRange { rows, of } => {
             format!("{rows} of {of} rows are beyond the range of the logs that the parameter blob was fitted to, so the blob extrapolates")

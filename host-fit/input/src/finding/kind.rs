@@ -225,7 +225,7 @@ kinds! {
     OtherMotion { micro: f64, service_micro: f64, unit: &'static str, is_scale: bool } => Code::OutOfRange, *micro, *unit;
     /// Predicted errors in the speed and the acceleration that `[motion]` declares for service, over the noise floor of the
     /// worst axis, without and with the correction, the rms motion up to which they are good, and the lags of A, B, C
-    /// behind their mean.
+    /// behind the middle probe.
     InMotion { ratio: f64, corrected_ratio: f64, acceleration_m_s2: f64, speed_mm_s: f64, shows_acceleration: bool, lag_us: [f64; 3] } => Code::Motion, *acceleration_m_s2, "m/s2";
     /// Rows beyond the calibrated range of a blob.
     BeyondRange { rows: usize, of: usize } => Code::OutOfRange, *rows as f64, "rows";

@@ -154,13 +154,20 @@ impl MotionFit {
         self
     }
 
+    /// Lags of A, B, C behind the middle probe, s: in service one late probe makes no other probe early.
+    pub fn lags_behind_middle_s(&self) -> [f64; 3] {
+        let mut sorted = self.dynamics.probe_lag_s;
+        sorted.sort_by(f64::total_cmp);
+        self.dynamics.probe_lag_s.map(|lag_s| lag_s - sorted[1])
+    }
+
     /// The matrices of the correction, X, Y, Rz in m, m, rad: -G k by the acceleration of X, Y, Rz (s2) and L by their
     /// speed (s). `None` where the probes do not determine the pose.
     pub fn correction(&self, parameters: &FieldParameters) -> Option<[Matrix3<f64>; 2]> {
         let (readings, poses) = jacobian(parameters)?;
         let k =
             Matrix3::from_fn(|probe, axis| self.dynamics.m_per_m_s2[probe][axis] * ARMS_M[axis]);
-        let lags = Matrix3::from_diagonal(&self.dynamics.probe_lag_s.into());
+        let lags = Matrix3::from_diagonal(&self.lags_behind_middle_s().into());
         Some([-poses * k, poses * lags * readings])
     }
 
@@ -189,7 +196,7 @@ impl MotionFit {
         let known = if is_corrected {
             [0.0; 3]
         } else {
-            self.dynamics.probe_lag_s
+            self.lags_behind_middle_s()
         };
         let known = Vector3::from(known);
         let lags = self.probe_lag_covariance + known * known.transpose();
