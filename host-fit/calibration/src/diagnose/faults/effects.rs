@@ -94,11 +94,6 @@ impl Suspect {
         }
     }
 
-    /// Whether Hall probes are late.
-    pub(super) const fn is_late_probe(&self) -> bool {
-        matches!(self.follows, Follows::OwnSpeed) && self.first < 3
-    }
-
     /// The channels, as numbers in [`Channel::SINGLE`].
     pub(super) const fn channels(&self) -> Range<usize> {
         self.first..self.first + self.count

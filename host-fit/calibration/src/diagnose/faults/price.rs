@@ -217,17 +217,12 @@ impl Finder<'_> {
         let motion = MotionFit::new(values.as_slice(), &covariance, by.shows_acceleration);
         let middle = |values: [f64; 3]| values[0] - off_middle(values)[0];
         let lag_s = middle(self.lags_s) + repaired.lag_s();
-        // Without such a fault the lags of the fit stay.
-        let is_late = faults.iter().any(|fault| fault.suspect.is_late_probe());
         let repair = Repair {
             parameters: repaired.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
             // One late probe is no lag of all.
             lag_s: lag_s - middle(motion.dynamics.probe_lag_s),
-            motion: match is_late {
-                true => motion.with_other_lags(stays.probe_lags_s),
-                false => motion,
-            },
+            motion: motion.with_other_lags(stays.probe_lags_s),
         };
         let judged = if is_better { &expected } else { &predicted };
         let unexplained = variances(&bent.solve(&by_motion).as_slice()[..COUNT]);
@@ -241,7 +236,7 @@ impl Finder<'_> {
         Some(Faults {
             findings,
             predicted: Some(predicted),
-            probe_lags_s: is_late.then_some(stays.probe_lags_s),
+            probe_lags_s: (!faults.is_empty()).then_some(stays.probe_lags_s),
             repair: is_better.then_some((repair, expected)),
             residual,
         })
