@@ -125,9 +125,10 @@ fn decide(findings: &[Finding], ratio: Option<f64>, is_for_service: bool) -> Ver
         let is_lost = match found.code().entry().trust {
             Trust::Kept => false,
             Trust::Lost => true,
-            Trust::LostOfSensors => {
+            of_kind => {
                 let mut causes = found.channels.iter().chain(&found.alike);
-                causes.any(|channel| !channel.is_beam())
+                let are_beams = of_kind == Trust::LostOfBeams;
+                causes.any(|channel| channel.is_beam() == are_beams)
             }
         };
         is_lost && found.severity > Severity::Note
@@ -289,6 +290,21 @@ mod tests {
         );
         assert_eq!(
             verdict(vec![late(Channel::HallB)], fit),
+            Some(Verdict::Limited)
+        );
+        let rough = |channel| {
+            Finding::new(Kind::Noisy {
+                noise_um: 1.0,
+                ratio: 1.4,
+            })
+            .with_channel(channel)
+        };
+        assert_eq!(
+            verdict(vec![rough(Channel::HallB)], fit),
+            Some(Verdict::Good)
+        );
+        assert_eq!(
+            verdict(vec![rough(Channel::BeamX)], fit),
             Some(Verdict::Limited)
         );
         let limits = || Finding::new(Kind::OtherProbes { tolerances: 9.0 });

@@ -12,6 +12,8 @@ pub enum Trust {
     Lost,
     /// They hold if the finding is about beams, which do not exist in service.
     LostOfSensors,
+    /// They hold if the finding is about sensors: its cost in service is in them.
+    LostOfBeams,
 }
 
 /// All that holds for every finding of a code.
@@ -81,10 +83,10 @@ codes! {
     IdleMovement, "idle_movement", Warn, "nothing moves in a movement", "leave it out, or record it again", [], Kept, WARN;
     Saturated, "saturated", Warn, "codes stand at the end of a converter's range", "reduce the gain or the motion", [TermsAtLimit ZeroClipped LogsDisagree], LostOfSensors, WARN;
     Overflow, "overflow", Refuse, "a counter of a channel overflows", "read the channel with more bits, or unwrap it before the log is written", [ChannelInverted ScaleWrong Step GainDrift], Kept, WARN;
-    StuckBit, "stuck_bit", Warn, "a bit of a code never changes, so that steps are missing", "check the converter and its bus; in service the missing steps make the pose wrong", [Hum GainDrift], Lost, WARN;
-    Coarse, "coarse", Warn, "a channel is written in steps that are larger than the noise", "write more digits, or use a converter with more bits", [], Lost, WARN;
+    StuckBit, "stuck_bit", Warn, "a bit of a code never changes, so that steps are missing", "check the converter and its bus; in service the missing steps make the pose wrong", [Hum GainDrift], LostOfBeams, WARN;
+    Coarse, "coarse", Warn, "a channel is written in steps that are larger than the noise", "write more digits, or use a converter with more bits", [], LostOfBeams, WARN;
     Slow, "slow", Warn, "a channel is sampled at a lower rate, averaged or low-pass filtered", "record each channel in each servo period, and turn filters and averaging off", [Hum ReferenceLag Step GainDrift Drift Stuck], Lost, WARN;
-    Noisy, "noisy", Warn, "a channel has more noise than the others of its kind, or more at times", "check its cable, shield, supply and reading", [], Lost, WARN;
+    Noisy, "noisy", Warn, "a channel has more noise than the others of its kind, or more at times", "check its cable, shield, supply and reading", [], LostOfBeams, WARN;
     Outliers, "outliers", Warn, "rows are far outside the noise", "look for lost pulses, sparks and wrong bits", [], Kept, WARN;
     ShortMovements, "short_movements", Warn, "movements are so short that their own zero deviations hide errors", "check the times and the movement column", [], Kept, WARN;
     RowsMissing, "rows_missing", Warn, "servo periods have no row, or a draw has no row of a movement", "use a recorder that keeps up, or a larger --train", [], Kept, None;
