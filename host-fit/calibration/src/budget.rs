@@ -78,9 +78,6 @@ impl Budget {
             }
         }
         let noise = [0, 1, 2].map(|axis| predicted.noise(axis));
-        let all = predicted.rms.map(|rms| rms * rms);
-        let other = [0, 1, 2]
-            .map(|axis| (all[axis] - noise[axis] * noise[axis] - systematic[axis]).max(0.0));
         let shown = |name: &str, variances: [[f64; 3]; 2]| {
             let [rms, ends] = variances.map(|of_axes| of_axes.map(f64::sqrt));
             let (name, unit) = (name.to_owned(), String::new());
@@ -97,11 +94,11 @@ impl Budget {
             sources: vec![
                 shown("noise of the probes", [noise.map(|x| x * x), ends[0]]),
                 shown("parameters by the fit", [systematic, ends[1]]),
-                shown("faults and motion that the log shows", [other; 2]),
+                shown("faults and motion that the log shows", [[0.0; 3]; 2]),
             ],
             not_included: Vec::new(),
             freedom: freedom as f64,
-            other,
+            other: [0.0; 3],
         };
         for (input, name) in NAMES {
             let value = stage.uncertainty.get(input);
@@ -118,7 +115,38 @@ impl Budget {
                     .push(format!("{name} (uncertainty.{})", input.key())),
             }
         }
-        Some(budget)
+        Some(budget.with_service(predicted))
+    }
+
+    /// The budget with the errors in service that a log shows beyond noise and fit.
+    #[must_use]
+    pub fn with_service(mut self, predicted: &Predicted) -> Self {
+        if let [noise, fit, shown, ..] = self.sources.as_mut_slice() {
+            let square = |axis: usize, of: [f64; 3]| of[axis] * of[axis];
+            self.other = [0, 1, 2].map(|axis| {
+                let known = square(axis, noise.rms) + square(axis, fit.rms);
+                (square(axis, predicted.rms) - known).max(0.0)
+            });
+            shown.rms = self.other.map(f64::sqrt);
+            shown.ends = shown.rms;
+        }
+        self
+    }
+
+    /// Variances of X, Y, Rz by the declared inputs, or by the sources that the log shows: m2, m2, rad2.
+    fn variances(&self, are_declared: bool) -> [f64; 3] {
+        let of_kind = self
+            .sources
+            .iter()
+            .filter(|source| source.value.is_some() == are_declared);
+        of_kind.fold([0.0; 3], |sum, source| {
+            [0, 1, 2].map(|axis| sum[axis] + source.rms[axis].powi(2))
+        })
+    }
+
+    /// Standard uncertainty of X, Y, Rz by the declared inputs alone, rms over service: m, m, rad.
+    pub fn declared(&self) -> [f64; 3] {
+        self.variances(true).map(f64::sqrt)
     }
 
     /// Combined standard uncertainty of X, Y, Rz, rms over service and at its ends: m, m, rad.
@@ -137,10 +165,7 @@ impl Budget {
     /// Effective degrees of freedom of X, Y, Rz (Welch and Satterthwaite); inputs that are declared have infinitely many.
     pub fn effective_freedom(&self) -> [f64; 3] {
         let [combined, _] = self.combined();
-        let shown = self.sources.iter().filter(|source| source.value.is_none());
-        let shown = shown.fold([0.0; 3], |sum, source| {
-            [0, 1, 2].map(|axis| sum[axis] + source.rms[axis].powi(2))
-        });
+        let shown = self.variances(false);
         [0, 1, 2].map(|axis| self.freedom * (combined[axis].powi(2) / shown[axis]).powi(2))
     }
 

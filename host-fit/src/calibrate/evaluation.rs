@@ -114,7 +114,11 @@ impl Evaluation {
             Validity::new(stage, &parameters, white_m, covariance)
         });
         let predicted = diagnosis.predicted.as_ref().filter(|_| is_field(set));
-        let limits = ErrorLimits::default().or(&stage.certificate, predicted);
+        // The reference of the fit decides.
+        let of_fit = known.and_then(|known| known.budget.clone());
+        diagnosis.budget = of_fit.zip(predicted).map(|(of, by)| of.with_service(by));
+        let budget = diagnosis.budget.as_ref();
+        let limits = ErrorLimits::default().or(&stage.certificate, predicted, budget);
         let refusal = other
             .or_else(|| Refusal::from_findings(&diagnosis.findings))
             .or_else(|| limits.refusal(predicted?, diagnosis.verdict));

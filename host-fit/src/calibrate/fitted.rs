@@ -109,7 +109,8 @@ impl FitOrder {
         }
         let is_field = fitted.as_ref().is_ok_and(|fit| fit.field.is_some());
         let predicted = diagnosis.predicted.as_ref().filter(|_| is_field);
-        let limits = self.limits.or(&stage.certificate, predicted);
+        let budget = diagnosis.budget.as_ref();
+        let limits = self.limits.or(&stage.certificate, predicted, budget);
         let mut outcome = JudgedFit {
             fitted,
             diagnosis,

@@ -1,5 +1,6 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
+use hallstage_calibration::budget::Budget;
 use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
 use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
@@ -43,14 +44,21 @@ impl FromStr for ErrorLimits {
 }
 
 impl ErrorLimits {
-    /// These, else those of the certificate; guarded ones less what the rms error may be larger than predicted.
+    /// These, else the limits of the certificate. A guarded limit is less by the amount that the rms error may be
+    /// larger than predicted: by the log, and by the declared inputs of the budget.
     #[must_use]
-    pub fn or(self, table: &CertificateTable, predicted: Option<&Predicted>) -> Self {
+    pub fn or(
+        self,
+        table: &CertificateTable,
+        predicted: Option<&Predicted>,
+        budget: Option<&Budget>,
+    ) -> Self {
+        let declared = budget.map_or([0.0; 3], Budget::declared);
         Self([0, 1, 2].map(|k| {
             let limit = self.0[k].or(table.limits[k])?;
             let guarded = predicted.filter(|_| table.is_guarded);
-            let guard = guarded.map_or(0.0, |of| of.range[k][1] - of.rms[k]);
-            Some(limit - guard)
+            let guard = guarded.map_or(0.0, |of| of.range[k][1].hypot(declared[k]) - of.rms[k]);
+            Some((limit - guard).max(0.0))
         }))
     }
 
@@ -118,7 +126,7 @@ mod tests {
         };
         let given = ErrorLimits([None, Some(1.5e-6), None]);
         let refused = |table: &CertificateTable| {
-            let limits = given.or(table, Some(&predicted));
+            let limits = given.or(table, Some(&predicted), None);
             let refusal = limits.refusal(&predicted, Some(Verdict::Good));
             refusal.map(|refusal| match refusal {
                 Refusal::BeyondLimit { errors, .. } => errors.iter().map(|e| e.axis.key).collect(),

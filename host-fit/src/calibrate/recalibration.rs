@@ -52,7 +52,8 @@ impl Updated {
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
         let predicted = new.diagnosis.predicted.as_ref();
-        let limits = ErrorLimits::default().or(&stage.certificate, predicted);
+        let budget = new.diagnosis.budget.as_ref();
+        let limits = ErrorLimits::default().or(&stage.certificate, predicted, budget);
         let refusal = Refusal::from_findings(&new.diagnosis.findings);
         Ok(Self {
             figures: figures(change, &new, log, &warnings),

@@ -160,7 +160,7 @@ impl Source<'_> {
         if self.subject.in_service {
             let rule = match table.is_guarded {
                 true => {
-                    "guarded acceptance (JCGM 106): the limit is less the uncertainty of the rms error, one-sided 95 %"
+                    "guarded acceptance (JCGM 106): the limit is less the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
                 }
                 false => "simple acceptance (JCGM 106): rms errors in service at most at the limit",
             };

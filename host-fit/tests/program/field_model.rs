@@ -127,7 +127,9 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
 #[test]
 fn the_budget_of_a_fit_reaches_the_page_and_the_uncertainty_of_each_pose() {
     let bench = bench();
-    let stage = bench.text("stage.toml");
+    let stage =
+        bench.text("stage.toml") + "\n[certificate]\nlimit = { rz_rad = 3.5e-6 }\nguarded = true\n";
+    bench.write("stage.toml", &stage);
     bench.write(
         "rough.toml",
         stage.replace("baseline_m = 0.17e-3", "baseline_m = 1.7e-3"),
@@ -136,6 +138,10 @@ fn the_budget_of_a_fit_reaches_the_page_and_the_uncertainty_of_each_pose() {
         let fit = "fit log.csv --out p.bin --json p.json --report report --force";
         bench.good(&format!("{fit} --stage {stage}.toml"));
         let budget = bench.json("p.json")["budget"].clone();
+        // The guard band has the declared inputs.
+        let code = &bench.json("p.json")["refusal"]["code"];
+        let wanted = ["beyond_limit"].into_iter().find(|_| stage == "rough");
+        assert_eq!(code.as_str(), wanted);
         let absent = budget["not_included"].to_string();
         assert!(
             absent.contains("beam_angles_rad") && absent.contains("drift"),
@@ -153,6 +159,18 @@ fn the_budget_of_a_fit_reaches_the_page_and_the_uncertainty_of_each_pose() {
             poses.iter().map(|row| row[column].powi(2)).sum::<f64>() / poses.len() as f64
         };
         let combined = number(&budget["combined"]["rms"]["rz_urad"]);
+        // An evaluation has the reference of the fit, too.
+        let eval = "eval p.bin service.csv --json e.json";
+        match wanted {
+            Some(_) => bench.bad(eval, 4, &["beyond the limit: rz"]),
+            None => drop(bench.good(eval)),
+        }
+        let judged = bench.json("e.json");
+        let of_eval = number(&judged["budget"]["combined"]["rms"]["rz_urad"]);
+        assert!(
+            (of_eval / combined - 1.0).abs() < 0.02,
+            "{of_eval} {combined}"
+        );
         [combined, mean(11).sqrt(), mean(14).sqrt(), mean(4).sqrt()]
     });
     assert!(
