@@ -47,7 +47,7 @@ pub(super) struct Suspect {
 
 /// Everything that is looked for: each channel by itself, and the gains and times of all channels of a kind, because
 /// the beams share a laser and a filter. The common lag of the beams is an unknown of the fit. It equals minus the lag of all Hall
-/// probes, so neither is listed. Those of a channel stand together.
+/// probes, so neither is listed. The suspects of a channel stand together.
 pub(super) fn suspects(with_motion: bool) -> impl Iterator<Item = Suspect> {
     let some = |follows, first, count| Suspect {
         follows,

@@ -89,7 +89,7 @@ pub(super) struct Sensed {
     values: Vec<[f64; 9]>,
     /// Their changes by time, m/s.
     rates: Vec<[f64; 9]>,
-    /// And those by time, m/s2.
+    /// The changes of the rates by time, m/s2.
     accelerations: Vec<[f64; 9]>,
     rms_rates: [f64; 9],
     /// Mean power of accelerations of the last time, (m/s2)2.

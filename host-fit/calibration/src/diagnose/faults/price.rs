@@ -53,7 +53,7 @@ impl Stays {
                     }
                     (Some(Quantity::Time), 0..3) => probe_lags_s[channel] += 1e-3 * size,
                     (Some(Quantity::Time), 6..) => sensors.push((channel, suspect.follows, *size)),
-                    // Nothing shows before or after which change of its gain the reference is right.
+                    // The reference may be right before its gain changes, or after.
                     (Some(Quantity::Gain), 3..6) => {
                         are_forms = false;
                         sensors.push((channel, suspect.follows, -size));
