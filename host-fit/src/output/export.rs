@@ -30,8 +30,36 @@ impl ExportFormat {
     }
 }
 
-/// Addresses of the parameter slots 0 and 1, as in the project's `memory.x`.
-pub const SLOTS: [u32; 2] = [0x0800_4000, 0x0800_8000];
+/// The project's memory map. A map with a slot in a wrong place does not link.
+const MAP: &str = include_str!("../../../memory.x");
+
+/// Addresses of the parameter slots 0 and 1 of the memory map.
+pub const SLOTS: [u32; 2] = {
+    let first = number_behind("_parameter_slot_0 = 0x");
+    [first, first + number_behind("_parameter_slot_bytes = 0x")]
+};
+
+/// The hexadecimal number behind a text of the memory map.
+const fn number_behind(text: &str) -> u32 {
+    let (map, text) = (MAP.as_bytes(), text.as_bytes());
+    let (mut at, mut matched, mut number) = (0, 0, 0);
+    while matched < text.len() {
+        matched = if map[at] == text[matched] {
+            matched + 1
+        } else {
+            0
+        };
+        at += 1;
+    }
+    while map[at] != b';' {
+        number = match (map[at] as char).to_digit(16) {
+            Some(digit) => number << 4 | digit,
+            None => panic!("memory.x: a hexadecimal number is expected"),
+        };
+        at += 1;
+    }
+    number
+}
 
 /// Why nothing is exported.
 #[derive(Debug, thiserror::Error)]

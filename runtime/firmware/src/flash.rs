@@ -13,6 +13,9 @@ unsafe extern "C" {
     static mut _parameter_slot_0: [u8; BYTES];
 }
 
+/// Start of the flash. Sectors 0 to 3 have the bytes of a slot each (table 5).
+const FIRST: u32 = 0x0800_0000;
+
 /// The keys that open FLASH_CR, one after the other (section 3.6.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 /// Bits of FLASH_SR: end of operation; errors; busy (section 3.9.4). The first two are cleared by
@@ -118,11 +121,13 @@ impl Flash for Sectors {
     }
 
     fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
+        let start = Self::address(u32::from(slot & 1) * SLOT_BYTES) as u32;
+        let sector = (start - FIRST) / SLOT_BYTES;
         self.operate(|registers| {
-            // SAFETY: the number of a sector, 1 or 2 (table 5).
+            // SAFETY: the number of a sector, 1 to 3: `memory.x` links with no other slots.
             registers.cr().modify(|_, w| unsafe {
                 w.psize().psize32().ser().set_bit();
-                w.snb().bits(1 + (slot & 1))
+                w.snb().bits(sector as u8)
             });
             registers.cr().modify(|_, w| w.strt().set_bit());
             SECTOR_LOOKS
