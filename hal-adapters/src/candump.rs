@@ -1,4 +1,5 @@
-//! One line of a `candump -L` log: `(seconds.microseconds) interface identifier#data`.
+//! One line of a `candump -L` log: `(seconds.microseconds) interface identifier#data`; or of candump's screen:
+//! `(seconds.microseconds)  interface  identifier   [length]  data`.
 //!
 //! ```
 //! use hal_adapters::candump::LogLine;
@@ -45,6 +46,8 @@ pub enum LineError {
 const TIME: &str = "a line starts with (seconds.microseconds)";
 const PARTS: &str = "a line has a time, an interface and a frame";
 const IDENTIFIER: &str = "an identifier has three or eight hexadecimal digits, and `#` follows";
+const SCREEN: &str =
+    "an identifier has three or eight hexadecimal digits, and `#` or [length] and data follow";
 const DATA: &str = "data are up to eight pairs of hexadecimal digits";
 
 /// Bit of a logged identifier that marks an error frame.
@@ -67,6 +70,14 @@ impl<'l> LogLine<'l> {
         let (Some(interface), Some(text)) = (parts.next(), parts.next()) else {
             return Err(broken(end, PARTS));
         };
+        if !text.contains('#') {
+            let frame = parse_screen(text, parts).ok_or_else(|| broken(text, SCREEN))??;
+            return Ok(Self {
+                time_us,
+                interface,
+                frame,
+            });
+        }
         // A fourth part, R or T, is the direction (candump -x).
         if let Some(rest) = parts.find(|part| !matches!(*part, "R" | "T")) {
             return Err(broken(rest, PARTS));
@@ -119,6 +130,32 @@ fn parse_id(text: &str) -> Option<Result<Id, LineError>> {
         8 => Some(Ok(Id::Extended(ExtendedId::new(value)?))),
         _ => None,
     }
+}
+
+/// The frame of a line of the screen, of which identifier and rest are given.
+fn parse_screen<'l>(
+    id: &str,
+    mut rest: impl Iterator<Item = &'l str>,
+) -> Option<Result<BusFrame, LineError>> {
+    let length = rest.next()?.strip_prefix('[')?.strip_suffix(']')?;
+    let id = match (length.len(), parse_id(id)?) {
+        // Lengths of CAN FD have two digits.
+        (2, _) => return Some(Err(LineError::FlexibleDataRate)),
+        (_, Err(error)) => return Some(Err(error)),
+        (_, Ok(id)) => id,
+    };
+    let length = length.parse().ok()?;
+    let mut bytes = [0; 8];
+    let mut read = 0;
+    for pair in rest {
+        if pair == "remote" {
+            return BusFrame::new_remote(id, length).map(Ok);
+        }
+        let is_pair = pair.len() == 2 && pair.bytes().all(|digit| digit.is_ascii_hexdigit());
+        *bytes.get_mut(read).filter(|_| is_pair)? = u8::from_str_radix(pair, 16).ok()?;
+        read += 1;
+    }
+    BusFrame::new(id, bytes.get(..length).filter(|_| read == length)?).map(Ok)
 }
 
 fn parse_data(id: Id, text: &str) -> Option<BusFrame> {
@@ -182,7 +219,16 @@ mod tests {
             ("(99999999999999999999.000000) can0 110#00", broken(1, TIME)),
             ("(1.000000)", broken(11, PARTS)),
             ("(1.000000) can0", broken(16, PARTS)),
-            ("(1.000000) can0 110", broken(17, IDENTIFIER)),
+            ("(1.000000) can0 110", broken(17, SCREEN)),
+            ("(1.000000) can0 110 [2] 00", broken(17, SCREEN)),
+            ("(1.000000) can0 110 [1] 0g", broken(17, SCREEN)),
+            ("(1.000000) can0 110 [1] +1", broken(17, SCREEN)),
+            (
+                "(1.000000) can0 110 [9] 00 00 00 00 00 00 00 00 00",
+                broken(17, SCREEN),
+            ),
+            ("(1.000000) can0 110 [01] 00", LineError::FlexibleDataRate),
+            ("(1.000000) can0 20000004 [1] 00", LineError::ErrorFrame),
             ("(1.000000) can0 11#00", broken(17, IDENTIFIER)),
             ("(1.000000) can0 800#00", broken(17, IDENTIFIER)),
             ("(1.000000) can0 +10#00", broken(17, IDENTIFIER)),
@@ -205,6 +251,31 @@ mod tests {
     fn the_direction_of_candump_x_is_accepted() {
         let line = LogLine::parse("(1.000000) can0 110#00 R").expect("sound");
         assert_eq!(line.frame.data(), [0]);
+    }
+
+    #[test]
+    fn a_line_of_the_screen_is_the_line_of_the_log() {
+        for (screen, log) in [
+            (
+                " (1.000000)  can0  15A   [8]  6C 00 01 02 03 04 05 FF",
+                "(1.000000) can0 15A#6C000102030405FF",
+            ),
+            (
+                "(1.000000) vcan0 00000001 [0]",
+                "(1.000000) vcan0 00000001#",
+            ),
+            (
+                "(1.000000) vcan0 123 [2] remote request",
+                "(1.000000) vcan0 123#R2",
+            ),
+        ] {
+            assert_eq!(
+                LogLine::parse(screen.trim_start()),
+                LogLine::parse(log),
+                "{screen}"
+            );
+            assert!(LogLine::parse(log).is_ok(), "{log}");
+        }
     }
 
     proptest! {
