@@ -90,13 +90,13 @@ impl LogColumn {
         let column = named.map(|(cell, name)| {
             let in_name = units::split(name).1;
             let below = Some(head.unit(cell)).filter(|unit| !unit.is_empty());
-            let is_date = head.is_date(cell);
-            let unit = in_name.or(below).filter(|_| !is_date);
+            let is_time = head.is_time(cell);
+            let unit = in_name.or(below).filter(|_| !is_time);
             Self {
                 name: name.clone(),
-                in_name: in_name.is_some() && !is_date,
+                in_name: in_name.is_some() && !is_time,
                 quantity: Quantity::guess(name, unit),
-                unit: unit.or(is_date.then_some("iso")).map(str::to_owned),
+                unit: unit.or(is_time.then_some("iso")).map(str::to_owned),
                 numbers: Vec::new(),
             }
         });
@@ -117,7 +117,7 @@ impl LogColumn {
         let name = quoted(&self.name);
         let unit = self.unit.as_deref().unwrap_or_default();
         let is_plain = matches!(kind, Dimension::Index | Dimension::Code) && units::is_count(unit);
-        let known = kind.unit(unit).is_some();
+        let known = kind.unit(unit).is_some() || (kind == Dimension::Time && units::is_rows(unit));
         match (is_plain || (known && self.in_name), known) {
             (true, _) => (name, true),
             (false, true) => (
@@ -148,12 +148,15 @@ fn decide_by_neighbours(columns: &mut [LogColumn]) {
     let has = |quantity| columns.iter().any(|c| c.quantity == Some(quantity));
     let beam = has(Quantity::BeamY1) && !has(Quantity::BeamX) && !has(Quantity::Y);
     if !has(Quantity::Time) {
-        let is_time = |column: &&mut LogColumn| {
-            let free = column.quantity.is_none();
-            free && column.step().is_some() && column.scale(Dimension::Time).is_some()
-        };
-        if let Some(time) = columns.iter_mut().find(is_time) {
+        let grows = |column: &LogColumn| column.step().filter(|_| column.quantity.is_none());
+        let is_time = |c: &LogColumn| grows(c).is_some() && c.scale(Dimension::Time).is_some();
+        let is_counter = |c: &LogColumn| grows(c) == Some(1.0) && c.unit.is_none();
+        let time = columns.iter().position(is_time);
+        let counter = || columns.iter().position(is_counter);
+        if let Some(time) = time.or_else(counter).and_then(|time| columns.get_mut(time)) {
             time.quantity = Some(Quantity::Time);
+            let rows = || "rows".to_owned();
+            time.unit.get_or_insert_with(rows);
         }
     }
     for column in columns {

@@ -15,7 +15,6 @@
 #![forbid(unsafe_code)]
 
 pub mod axis;
-mod binary;
 pub mod channel;
 pub mod channels;
 pub mod dataset;
@@ -24,6 +23,7 @@ mod encoding;
 pub mod finding;
 pub mod log;
 pub mod log_format;
+pub mod other_format;
 mod resets;
 pub mod rotation;
 mod sample;

@@ -14,6 +14,7 @@ pub mod header;
 pub mod layout;
 pub mod lines;
 pub mod order;
+mod pattern;
 mod preamble;
 mod record;
 pub mod rows;
@@ -25,6 +26,7 @@ pub mod units;
 
 pub use cell::CellFault;
 pub use error::{LogError, LogProblem, Place};
+pub use pattern::Pattern;
 pub use stream::{LogEnd, LogRow, LogRows};
 
 use crate::channel::Channel;

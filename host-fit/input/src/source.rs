@@ -39,6 +39,9 @@ pub enum SourceProblem {
         offset: usize,
         looks_like: &'static str,
     },
+    /// Text, and no table.
+    #[error("no table of numbers: it looks like {looks_like}")]
+    OtherFormat { looks_like: &'static str },
     /// Text in UTF-16 with bytes that are no character: where, from 0, after decompression.
     #[error("the UTF-16 text is damaged (byte {offset}); save it again, as UTF-8")]
     Utf16 { offset: usize },

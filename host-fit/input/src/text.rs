@@ -2,8 +2,8 @@
 //! ASCII in it. A file that is plainly not text is refused by its start, since a device or a damaged file may
 //! have no end.
 
-use super::binary;
 use super::encoding::Utf16;
+use super::other_format;
 use super::source::{self, SourceError, SourceProblem};
 use flate2::bufread::MultiGzDecoder;
 use sha2::{Digest, Sha256};
@@ -101,7 +101,7 @@ impl<'a> TextReader<'a> {
             start: Vec::new(),
             hash: None,
         };
-        let mut start = text.piece(binary::PROBE_BYTES)?;
+        let mut start = text.piece(other_format::PROBE_BYTES)?;
         let utf16 = Utf16::from_start(&start);
         let mark = match &utf16 {
             Some((_, bytes)) => *bytes,
@@ -112,7 +112,7 @@ impl<'a> TextReader<'a> {
         text.mark = start;
         text.utf16 = utf16.map(|(decoder, _)| decoder);
         let decoded = decoded(&mut text.utf16.clone(), &text.start, false)?;
-        match binary::in_text(&decoded) {
+        match other_format::in_binary(&decoded) {
             None => Ok(text),
             Some((offset, looks_like)) => Err(SourceProblem::Binary { offset, looks_like }),
         }

@@ -25,6 +25,7 @@ pub(super) fn evidence(found: &Finding) -> String {
             format!("movement {first} has one row{others}. It adds nothing to the fit, because its zero deviation fits it exactly")
         }
         Kind::FileCut { .. } => "the last line has no line break, so its last number may be cut".to_owned(),
+        Kind::ColumnsLeftOut { columns, .. } => format!("left out: {}", listed(columns)),
         Kind::MovementsByTime { movements, gap_rows, .. } => {
             format!("there is no column for the movement. The times separate {}: one begins after a gap of more than {gap_rows} rows and where the time starts again", counted(*movements, "movement"))
         }

@@ -37,6 +37,7 @@ fn source(found: &Finding) -> String {
         (Kind::FileCut { file, line }, _) => format!("{file}:{line}: "),
         (
             Kind::SingleRows { file, .. }
+            | Kind::ColumnsLeftOut { file, .. }
             | Kind::MovementsByTime { file, .. }
             | Kind::BetweenCodes { file, .. }
             | Kind::RowsSkipped { file, .. }

@@ -133,6 +133,8 @@ kinds! {
     SingleRows { file: String, first: i64, movements: usize } => Code::ShortMovements, *movements as f64, "movements";
     /// The last line has no line break.
     FileCut { file: String, line: usize } => Code::FileCut;
+    /// Columns that are left out, by name.
+    ColumnsLeftOut { file: String, columns: Vec<String> } => Code::ColumnsLeftOut, columns.len() as f64, "columns";
     /// Movements are separated by the time, after a gap of more than `gap_rows` rows and where the time starts again.
     MovementsByTime { file: String, movements: usize, gap_rows: i64 } => Code::MovementsByTime, *movements as f64, "movements";
     /// Beams jump and the probes do not, as where interferometers are reset or slip.

@@ -99,6 +99,7 @@ codes! {
     ModelLacks, "model_lacks", Warn, "the log shows more than the model describes, or cannot carry a better model", "see the other findings; move all six axes at once", [], Lost, WARN;
     NotDetermined, "not_determined", Refuse, "the log does not determine the calibration well enough for service", "record all six axes moving at once over the range of service, for longer (host-fit plan makes such a run)", [], Kept, None;
     RowsSkipped, "rows_skipped", Warn, "rows or movements are left out because a cell is bad", "record them again if they matter", [], Kept, WARN;
+    ColumnsLeftOut, "columns_left_out", Note, "columns of the log that have no name, no cells or no known meaning are left out", "name a column that is needed in [log] of stage.toml, and put the others into `ignore`", [], Kept, None;
     MovementsByTime, "movements_by_time", Warn, "there is no column for the movement, so gaps in the times separate movements", "record a movement column", [], Kept, WARN;
     BetweenCodes, "between_codes", Warn, "voltages are not whole codes of the converter", "check volts_per_count, the instrument and rounding", [], Kept, WARN;
     FileCut, "file_cut", Warn, "the last line has no line break", "check whether the file was cut", [], Kept, WARN;

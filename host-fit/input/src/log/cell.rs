@@ -1,6 +1,7 @@
 //! One cell of a log as a number, or what is wrong with it.
 
 use super::decimal;
+use super::layout::Dimension;
 use crate::axis::sign;
 use crate::stage::CodeScale;
 
@@ -24,6 +25,15 @@ pub enum CellFault {
         "\"{text}\" has a decimal point, where the first rows of the log have decimal commas; write all numbers alike, without marks between thousands"
     )]
     DecimalPoint {
+        /// Its text, shortened.
+        text: String,
+    },
+    /// It holds no time.
+    #[error(
+        "\"{text}\" is no time that is read; write a number in {}, a date and time such as 2026-01-31T03:04:05.678, 2026/01/31 03:04:05.678, 31.01.2026 03:04:05.678 or 31-Jan-2026 03:04:05.678, or a duration such as 0:00:05.678 or 5.678 s; in 01/02/2026 the month is not certain",
+        Dimension::Time.units()
+    )]
+    NotATime {
         /// Its text, shortened.
         text: String,
     },
@@ -95,6 +105,7 @@ impl CellFault {
         match self {
             Self::Empty => "an empty cell",
             Self::NotANumber { .. } | Self::DecimalPoint { .. } => "a cell that is not a number",
+            Self::NotATime { .. } => "a time that cannot be read",
             Self::OtherTime { .. } => "a time written in another way than the first",
             Self::Nan | Self::Infinite { .. } => "a NaN or an infinity",
             Self::NotWhole { .. } => "a fraction where a whole number belongs",

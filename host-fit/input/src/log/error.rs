@@ -1,6 +1,7 @@
 //! Why a log is refused: where, what, and what to do.
 
 use super::cell::CellFault;
+use super::pattern::Pattern;
 use crate::source::{SourceError, SourceProblem};
 use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::path::PathBuf;
@@ -72,6 +73,14 @@ impl From<SourceError> for LogError {
     }
 }
 
+/// The columns that are not known, at the end of a message.
+fn unknown_columns(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        names => format!(" (not known: {})", names.join(", ")),
+    }
+}
+
 /// A fault of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogProblem {
@@ -128,13 +137,16 @@ pub enum LogProblem {
     },
     /// A column is missing.
     #[error(
-        "the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml"
+        "the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml{}",
+        unknown_columns(unknown)
     )]
     MissingColumn {
         /// The name that was looked for.
         column: String,
         /// The key in the `[log]` table.
         key: &'static str,
+        /// Columns that are not known.
+        unknown: Vec<String>,
     },
     /// The places of the beams are known, and the log holds no beams.
     #[error(
@@ -142,21 +154,10 @@ pub enum LogProblem {
          beams, or take `x`, `y1`, `y2`, `scale` and `air` out of [interferometer] in stage.toml"
     )]
     PoseWithPlaces,
-    /// A column is not known.
-    #[error(
-        "it is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml, which `host-fit init` drafts (known columns: {known})"
-    )]
-    UnknownColumn {
-        /// Its name.
-        name: String,
-        /// The columns that are known, by name.
-        known: String,
-    },
-    /// A column has no name.
-    #[error("it has no name; name it, or remove the separator too many")]
-    UnnamedColumn,
     /// Two columns for one quantity.
-    #[error("it repeats the quantity of column {first}; rename or remove one")]
+    #[error(
+        "it repeats the quantity of column {first}; name the one to read in the [log] table of stage.toml, and put the other into `ignore`"
+    )]
     RepeatedColumn {
         /// The other column, from 1.
         first: usize,
@@ -230,10 +231,26 @@ pub enum LogProblem {
         /// Time of this row, us.
         t_us: i64,
     },
-    /// A row has the time of the row above.
+    /// A clock starts again.
     #[error(
-        "the row repeats the time {t_us} us of the row above; remove the duplicate, or check the unit of the times"
+        "the time falls by 2^{bits} of its units, as a counter of {bits} bits does that is full; add 2^{bits} to all later times, or give the rows from here on a movement number of their own"
     )]
+    ClockWraps {
+        /// Bits of the counter.
+        bits: i32,
+    },
+    /// Many rows have the same fault.
+    #[error("{faults} of {rows} rows: {pattern}")]
+    Pattern {
+        /// Rows with the fault.
+        faults: usize,
+        /// Rows from the first with the fault on.
+        rows: usize,
+        /// What they have in common.
+        pattern: Pattern,
+    },
+    /// A row has the time of the row above.
+    #[error("the row repeats the time {t_us} us of the row above; remove one of the two rows")]
     DuplicatedRow {
         /// The time, us.
         t_us: i64,

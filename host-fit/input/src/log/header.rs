@@ -20,8 +20,10 @@ pub struct Source {
 pub type Set = ([Quantity; 3], [Source; 3]);
 
 /// The columns of one log.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Columns {
+    /// The columns that are left out, as messages name them.
+    pub(super) unknown: Vec<String>,
     /// `None` if gaps in the time separate the movements.
     pub(super) movement: Option<Source>,
     pub(super) time: Source,
@@ -34,21 +36,14 @@ pub(super) struct Columns {
     pub(super) temperature: [Option<Source>; 2],
 }
 
-/// The treatment of columns that the layout does not know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UnknownColumns {
-    /// Refuse the table: a misspelt name would be ignored without a word.
-    Refuse,
-    /// Leave them out: an instrument may record more than is needed.
-    LeaveOut,
-}
-
 /// The cells of a row that hold quantities of the layout.
 pub struct Header<'a> {
     table: &'a Head,
     layout: &'a LogLayout,
     /// The cell of each quantity that the table has.
     sources: [Option<Source>; Quantity::ALL.len()],
+    /// The columns that hold no quantity of the layout, as messages name them.
+    unknown: Vec<String>,
 }
 
 /// Finds the columns of a log.
@@ -58,7 +53,7 @@ pub(super) fn columns(
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
     let layout = &stage.log;
-    let header = Header::new(table, layout, UnknownColumns::Refuse)?;
+    let header = Header::new(table, layout)?;
     let movement = match header.find(Quantity::Movement) {
         None if !layout.is_mapped(Quantity::Movement) => None,
         _ => Some(header.all([Quantity::Movement])?[0]),
@@ -78,6 +73,7 @@ pub(super) fn columns(
         return Err(header.refused(LogProblem::PoseWithPlaces));
     }
     Ok(Columns {
+        unknown: header.unknown,
         movement,
         time,
         hall,
@@ -95,41 +91,44 @@ pub(super) fn columns(
 }
 
 impl<'a> Header<'a> {
-    /// Finds the quantities of the layout among the columns.
+    /// Finds the quantities of the layout among the columns. A column that has its exact name comes before one
+    /// that is known by other words. Columns without a name, a meaning or a unit of their quantity are unknown.
     ///
     /// # Errors
-    /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`,
-    /// `UnitsDisagree`.
-    pub fn new(
-        table: &'a Head,
-        layout: &'a LogLayout,
-        unknown: UnknownColumns,
-    ) -> Result<Self, LogError> {
+    /// `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`, `UnitsDisagree`.
+    pub fn new(table: &'a Head, layout: &'a LogLayout) -> Result<Self, LogError> {
         let mut header = Self {
             table,
             layout,
             sources: [None; Quantity::ALL.len()],
+            unknown: Vec::new(),
         };
-        for (cell, name) in table.names.iter().enumerate() {
-            let refuse = |problem| Err(table.place(table.line, cell, None).refuse(problem));
-            let (quantity, scale) = match (header.source(cell, name), unknown) {
-                (Ok(Some(found)), _) => found,
-                (Ok(None), _) => continue,
-                (
-                    Err(
-                        LogProblem::UnknownColumn { .. }
-                        | LogProblem::UnnamedColumn
-                        | LogProblem::NoUnit { .. },
-                    ),
-                    UnknownColumns::LeaveOut,
-                ) => continue,
-                (Err(problem), _) => return refuse(problem),
-            };
-            let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
-            if let Some(first) = earlier {
-                let first = first.cell + 1;
-                return refuse(LogProblem::RepeatedColumn { first });
+        let mut exact = header.sources;
+        for is_exact in [true, false] {
+            for (cell, name) in table.names.iter().enumerate() {
+                let refuse = |problem| Err(table.place(table.line, cell, None).refuse(problem));
+                let meaning = layout.meaning(name);
+                if matches!(meaning, Meaning::Exact(_)) != is_exact || meaning == Meaning::Ignored {
+                    continue;
+                }
+                let (quantity, scale) = match header.source(cell, name, meaning) {
+                    Ok(Some(found)) if exact[found.0 as usize].is_none() => found,
+                    Ok(_) => {
+                        header.unknown.push(match name.as_str() {
+                            "" => format!("column {} without a name", cell + 1),
+                            name => shown(name.as_bytes()),
+                        });
+                        continue;
+                    }
+                    Err(problem) => return refuse(problem),
+                };
+                let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
+                if let Some(first) = earlier {
+                    let first = first.cell + 1;
+                    return refuse(LogProblem::RepeatedColumn { first });
+                }
             }
+            exact = header.sources;
         }
         Ok(header)
     }
@@ -139,20 +138,23 @@ impl<'a> Header<'a> {
         Place::new(&self.table.path, self.table.line).refuse(problem)
     }
 
-    /// The quantity of a column, and m, rad, us or codes per unit; `None` if the column is left out.
-    fn source(&self, cell: usize, name: &str) -> Result<Option<(Quantity, f64)>, LogProblem> {
+    /// The quantity of a column, and m, rad, us or codes per unit; `None` if it holds none.
+    fn source(
+        &self,
+        cell: usize,
+        name: &str,
+        meaning: Meaning<'_>,
+    ) -> Result<Option<(Quantity, f64)>, LogProblem> {
         let below = self.table.unit(cell);
-        let (quantity, unit) = match self.layout.meaning(name) {
-            Meaning::Ignored => return Ok(None),
-            Meaning::Unknown if name.is_empty() => return Err(LogProblem::UnnamedColumn),
-            Meaning::Unknown => return Err(self.unknown(name)),
+        let (quantity, unit) = match meaning {
+            Meaning::Ignored | Meaning::Unknown => return Ok(None),
             Meaning::Exact(quantity) => (quantity, None),
             Meaning::WithUnit(quantity, unit) => {
                 let quantity = quantity.in_unit(unit.or(Some(below)));
                 let kind = quantity.dimension();
                 let fallback = match kind {
                     Dimension::Index | Dimension::Code => Some(below),
-                    Dimension::Time if self.table.is_date(cell) => Some("iso"),
+                    Dimension::Time if self.table.is_time(cell) => Some("iso"),
                     _ => (!below.is_empty()).then_some(below),
                 };
                 let Some(unit) = unit.or(fallback) else {
@@ -166,7 +168,7 @@ impl<'a> Header<'a> {
         let scale = match unit.map(|unit| self.layout.scale(quantity, unit)) {
             None => self.layout.column(quantity).scale,
             Some(Ok(scale)) => scale,
-            Some(Err(UnitFault::Unknown)) => return Err(self.unknown(name)),
+            Some(Err(UnitFault::Unknown)) => return Ok(None),
             Some(Err(UnitFault::NoVoltsPerCount)) => {
                 let table = quantity.table();
                 return Err(LogProblem::NoVoltsPerCount { table });
@@ -177,14 +179,6 @@ impl<'a> Header<'a> {
             return Err(LogProblem::UnitsDisagree { below });
         }
         Ok(Some((quantity, scale)))
-    }
-
-    fn unknown(&self, name: &str) -> LogProblem {
-        let names = Quantity::ALL.map(|quantity| self.layout.column(quantity).name.as_str());
-        LogProblem::UnknownColumn {
-            name: shown(name.as_bytes()),
-            known: names.join(", "),
-        }
     }
 
     /// Whether the unit below the header contradicts the column: it is a unit of the same kind, and so is the scale of
@@ -214,6 +208,7 @@ impl<'a> Header<'a> {
                 self.refused(LogProblem::MissingColumn {
                     column: self.layout.column(quantity).name.clone(),
                     key: quantity.key(),
+                    unknown: self.unknown.clone(),
                 })
             })?;
         }

@@ -12,7 +12,7 @@
 //! | `cmd_x`, `cmd_y`, `cmd_rz` | `cmd_x_m`, `cmd_y_m`, `cmd_rz_rad` | commanded pose |
 //! | `hall_a`, `hall_b`, `hall_c` | `hall_a_cnt`, `hall_b_cnt`, `hall_c_cnt` | Hall codes |
 //!
-//! A column that `[log]` does not name is also known by its key, or by its default name with another unit in any
+//! A column that `[log]` does not name is also known by its key, its default name or a usual name, with a unit in any
 //! spelling of `units.rs`: `ifm_x [um]`, `X/mm`, `Time (s)`.
 
 use super::units;
@@ -44,7 +44,7 @@ struct Entry {
     converter: &'static str,
     /// Its description in a draft of `stage.toml`.
     meaning: &'static str,
-    /// Words from which a draft guesses it, without unit, spaces and underscores, in lower case.
+    /// Usual names, without unit, spaces and underscores, in lower case.
     words: &'static [&'static str],
 }
 
@@ -76,7 +76,7 @@ macro_rules! quantities {
 #[rustfmt::skip]
 quantities! {
     Movement, "movement", "movement", Index, "", "number of the movement", ["movement" "move" "run" "segment" "motion" "trial"];
-    Time, "time", "t_us", Time, "", "time of the sample", ["t" "time" "timestamp" "datetime" "elapsed" "zeit"];
+    Time, "time", "t_us", Time, "", "time of the sample", ["t" "time" "timestamp" "datetime" "elapsed" "zeit" "xvalue"];
     BeamX, "ifm_x", "ifm_x_nm", Length, "", "interferometer along X", ["ifmx" "interferometerx" "laserx" "beamx" "x1"];
     BeamY1, "ifm_y1", "ifm_y1_nm", Length, "", "interferometer along Y at x = +baseline/2", ["ifmy1" "interferometery1" "lasery1" "beamy1" "y1"];
     BeamY2, "ifm_y2", "ifm_y2_nm", Length, "", "interferometer along Y at x = -baseline/2", ["ifmy2" "interferometery2" "lasery2" "beamy2" "y2"];
@@ -186,6 +186,8 @@ pub struct LogLayout {
     mapped: [bool; Quantity::ALL.len()],
     /// Columns to leave out.
     pub ignored: Vec<String>,
+    /// Time of one row, us: the servo period.
+    pub row_us: f64,
     /// Voltage of one Hall code, V.
     pub hall_volts_per_count: Option<f64>,
     /// Voltage of one capacitive code, V.
@@ -227,6 +229,7 @@ impl Default for LogLayout {
             columns: Quantity::ALL.map(column),
             mapped: [false; Quantity::ALL.len()],
             ignored: Vec::new(),
+            row_us: 2000.0,
             hall_volts_per_count: None,
             capacitive_volts_per_count: None,
         }
@@ -265,7 +268,8 @@ impl LogLayout {
             let default = units::split(quantity.default_column()).0;
             !self.is_mapped(*quantity) && (key == quantity.key() || key == default)
         };
-        let found = Quantity::ALL.into_iter().find(named);
+        let guessed = || Quantity::guess(name, unit).filter(|quantity| !self.is_mapped(*quantity));
+        let found = Quantity::ALL.into_iter().find(named).or_else(guessed);
         found.map_or(Meaning::Unknown, |quantity| {
             Meaning::WithUnit(quantity, unit)
         })
@@ -282,6 +286,9 @@ impl LogLayout {
         let kind = quantity.dimension();
         if matches!(kind, Dimension::Code | Dimension::Index) && units::is_count(symbol) {
             return Ok(1.0);
+        }
+        if kind == Dimension::Time && units::is_rows(symbol) {
+            return Ok(self.row_us);
         }
         let unit = kind.unit(symbol).ok_or(UnitFault::Unknown)?;
         let volts_per_count = match quantity.table() {

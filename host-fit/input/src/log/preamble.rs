@@ -1,106 +1,243 @@
-//! Where the header of a table stands: instruments write notes above it, some put it in a comment.
+//! What stands above the rows of a table: notes, the header, facts and units of the columns.
+//!
+//! The rows are the longest run of lines with mostly numbers. Their cells say what separates cells, and how many
+//! there are. The header is the last line above the rows whose cells are distinct names.
 
-use super::decimal;
+use super::cell::shown;
+use super::error::{LogError, LogProblem, Place};
 use super::lines::{TextLine, lines_of};
 use super::record::{Dialect, Record};
 use super::table::COLUMNS_MAX;
+use super::time::is_time;
+use super::{decimal, units};
+use crate::other_format;
+use crate::source::SourceProblem;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// Starts a comment, as the first byte of a line.
 pub(super) const COMMENT: u8 = b'#';
 
-/// What may separate cells.
-const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+/// What may separate cells; the first of them where two do as well.
+const SEPARATORS: [u8; 3] = [b'\t', b';', b','];
 
-/// Most lines of notes above the header, without comments and blank lines.
-const LINES_MAX: usize = 200;
+/// Number of lines that decide the form of a table, without comments and blank lines.
+const LINES_MAX: usize = 1000;
 
-/// Fewest known names of columns in a header.
+/// Fewest different known names of columns that make a header by themselves.
 const KNOWN_MIN: usize = 3;
 
-/// The header of a table.
-pub(super) struct HeaderLine {
-    /// Its line, from 1.
+/// Longest unit in a row of units, in characters, with brackets.
+const UNIT_CHARACTERS: usize = 16;
+
+/// What stands above the rows of a table.
+pub(super) struct Preamble {
+    /// The line of the header, from 1.
     pub(super) line: usize,
-    /// The first byte after it.
+    /// The line above the first row.
+    pub(super) above: usize,
+    /// The first byte of the first row.
     pub(super) end: usize,
-    /// What separates the cells of the table.
+    /// What separates the cells.
     pub(super) separator: u8,
     /// Names of the columns, without white space around them.
     pub(super) names: Vec<String>,
+    /// Units of the columns, where a line has them.
+    pub(super) units: Vec<String>,
+    /// The usual number of cells of the rows.
+    pub(super) cells: usize,
 }
 
-/// The header: the first line with at least three known names; without one, the line of known
-/// names in the last comment above the rows, as NumPy writes it; without one, the line above the
-/// first row of numbers, or above its row of units, with as many cells; without one, the first line
-/// that is neither blank nor a comment. `None` if there is no such line.
-pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Option<HeaderLine> {
-    let known = |line: &HeaderLine| line.names.iter().filter(|name| is_known(name)).count();
-    let mut plain: Vec<HeaderLine> = Vec::new();
-    let mut comment = None;
-    let mut records = SEPARATORS.map(|separator| {
-        Record::new(Dialect {
+/// A line of a text, taken apart; a comment without its mark.
+#[derive(Clone)]
+struct Line {
+    line: usize,
+    /// The first byte after it.
+    end: usize,
+    /// Its cells, without white space around them.
+    names: Vec<String>,
+}
+
+impl Preamble {
+    /// Of a table that begins with these bytes.
+    ///
+    /// The header is the first line with at least three known names; without one, the line of known names in the
+    /// last comment above the rows, as NumPy writes it; without one, the last line above the rows whose cells are
+    /// distinct names; without rows, the first line.
+    ///
+    /// # Errors
+    /// `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, and `OtherFormat` of a source.
+    pub(super) fn read(
+        bytes: &[u8],
+        path: &Path,
+        is_known: impl Fn(&str) -> bool,
+    ) -> Result<Self, LogError> {
+        let written = lines_of(bytes).filter(|line| !line.text.trim_ascii().is_empty());
+        let (notes, plain): (Vec<_>, Vec<_>) =
+            written.partition(|line| line.text.first() == Some(&COMMENT));
+        let plain = plain.get(..LINES_MAX).unwrap_or(&plain);
+        let separator = separator(plain);
+        let mut record = Record::new(Dialect {
             separator,
             decimal_commas: false,
-        })
-    });
-    for TextLine { text, line, end } in lines_of(bytes) {
-        let note = text.strip_prefix(&[COMMENT]);
-        let found = HeaderLine::new(note.unwrap_or(text), line, end, &mut records);
-        if note.is_some() {
-            let is_header = known(&found) >= KNOWN_MIN && !plain.iter().any(is_row);
-            comment = if is_header { Some(found) } else { comment };
-        } else if !text.trim_ascii().is_empty() {
-            if known(&found) >= KNOWN_MIN {
-                return Some(found);
-            }
-            plain.push(found);
-            if plain.len() == LINES_MAX {
-                break;
-            }
-        }
-    }
-    let above_rows = || {
-        let row = plain.iter().position(is_row)?;
-        let cells = plain.get(row)?.names.len();
-        let above = plain.get(..row)?.iter().rev();
-        let as_many = above.take_while(|line| line.names.len() == cells).count();
-        (as_many > 0).then_some(row - as_many)
-    };
-    let header = above_rows().unwrap_or(0);
-    comment.or_else(|| plain.into_iter().nth(header))
-}
-
-/// Whether a line is more than half numbers, and has at least two.
-fn is_row(line: &HeaderLine) -> bool {
-    let is_number = |cell: &&String| decimal::is_number(cell.as_bytes());
-    let numbers = line.names.iter().filter(is_number).count();
-    numbers >= 2 && 2 * numbers > line.names.len()
-}
-
-/// Whether every name is a number: then the line is a row.
-pub(super) fn is_numeric(names: &[String]) -> bool {
-    names.iter().all(|name| name.parse::<f64>().is_ok())
-}
-
-impl HeaderLine {
-    fn new(text: &[u8], line: usize, end: usize, records: &mut [Record; 3]) -> Self {
-        // The most frequent separator of the line.
-        let count = |which: &usize| text.iter().filter(|b| **b == SEPARATORS[*which]).count();
-        let which = (1..3).fold(0, |best, other| match count(&other) > count(&best) {
-            true => other,
-            false => best,
         });
-        let record = &mut records[which];
-        record.split(text);
+        let mut apart = |line| Line::new(line, &mut record);
+        let lines: Vec<Line> = plain.iter().map(&mut apart).collect();
+        let notes = notes.iter().map(apart);
+        let (first, cells) = rows(&lines);
+        let first_row = lines.get(first);
+        let is_above = |line: &Line| first_row.is_none_or(|row| line.line < row.line);
+        let is_header = |line: &Line| {
+            let known: BTreeSet<&String> = line.names.iter().filter(|n| is_known(n)).collect();
+            known.len() >= KNOWN_MIN
+        };
+        let by_name = lines.iter().find(|line| is_header(line)).cloned();
+        let in_note = || {
+            notes
+                .filter(|note| is_above(note) && is_header(note))
+                .last()
+        };
+        let by_place = || match first_row {
+            None => lines.first(),
+            Some(_) => lines.iter().take(first).rfind(|line| line.has_names(cells)),
+        };
+        let header = by_name.or_else(in_note).or_else(|| by_place().cloned());
+        let header = header.ok_or(LogProblem::NoHeader).and_then(Line::checked);
+        let header = header.map_err(|problem| {
+            let first = plain.first();
+            let format = first.and_then(|line| other_format::in_text(line.text));
+            let problem = match format {
+                _ if first.is_none() => LogProblem::Empty,
+                Some(looks_like) => SourceProblem::OtherFormat { looks_like }.into(),
+                None => problem,
+            };
+            Place::new(path, first.map(|line| line.line)).refuse(problem)
+        })?;
+        // Facts and units of the columns stand between the header and the rows.
+        let is_fact = |line: &Line| {
+            line.is_units() || (is_above(line) && line.names.first().is_some_and(is_word))
+        };
+        let row = lines
+            .iter()
+            .position(|line| line.line > header.line && !is_fact(line));
+        let passed = lines.get(..row.unwrap_or(lines.len())).unwrap_or_default();
+        let units = passed.iter().rfind(|line| line.is_units());
+        let last = passed
+            .last()
+            .filter(|last| last.line > header.line)
+            .unwrap_or(&header);
+        Ok(Self {
+            line: header.line,
+            above: last.line,
+            end: last.end,
+            separator,
+            units: units.map_or_else(Vec::new, |line| line.names.clone()),
+            cells: first_row.map_or(header.names.len(), |_| cells),
+            names: header.names,
+        })
+    }
+}
+
+impl Line {
+    fn new(line: &TextLine<'_>, record: &mut Record) -> Self {
+        record.split(line.text.strip_prefix(&[COMMENT]).unwrap_or(line.text));
         // One column too many is enough to refuse it.
         let cells = record.cells().take(COLUMNS_MAX + 1);
         Self {
-            line,
-            end,
-            separator: SEPARATORS[which],
-            names: cells.map(|cell| self::text(cell.text)).collect(),
+            line: line.line,
+            end: line.end,
+            names: cells.map(|cell| text(cell.text)).collect(),
         }
     }
+
+    /// The same, as a header.
+    fn checked(self) -> Result<Self, LogProblem> {
+        match self.names.as_slice() {
+            [one] => Err(LogProblem::NoSeparator {
+                text: shown(one.as_bytes()),
+            }),
+            names if names.len() > COLUMNS_MAX => {
+                Err(LogProblem::TooManyColumns { limit: COLUMNS_MAX })
+            }
+            _ => Ok(self),
+        }
+    }
+
+    /// Whether it is more than half numbers and times, and has at least two.
+    fn is_row(&self) -> bool {
+        let is_number =
+            |cell: &&String| decimal::is_number(cell.as_bytes()) || is_time(cell.as_bytes());
+        let numbers = self.names.iter().filter(is_number).count();
+        numbers >= 2 && 2 * numbers > self.names.len()
+    }
+
+    /// Whether it has distinct words, for at least half of so many cells.
+    fn has_names(&self, cells: usize) -> bool {
+        let mut names: Vec<&String> = self.names.iter().filter(|name| !name.is_empty()).collect();
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        names.len() == count
+            && count >= 2
+            && 2 * count >= cells
+            && names.into_iter().all(is_word)
+            && !self.is_units()
+    }
+
+    /// Whether it holds the units of columns: no number, at least two units, and nothing as long as a remark.
+    fn is_units(&self) -> bool {
+        let is_short = |cell: &String| cell.chars().count() <= UNIT_CHARACTERS;
+        let known = |cell: &&String| units::is_known(units::inside(cell));
+        self.names
+            .iter()
+            .all(|cell| is_short(cell) && cell.parse::<f64>().is_err())
+            && self.names.iter().filter(known).count() >= 2
+    }
+}
+
+/// Whether a cell is neither empty nor a number or a time.
+fn is_word(cell: &String) -> bool {
+    let cell = cell.as_bytes();
+    !cell.is_empty() && !decimal::is_number(cell) && !is_time(cell)
+}
+
+/// What separates the cells: most lines agree on their number.
+fn separator(lines: &[TextLine<'_>]) -> u8 {
+    let agree = |separator: &u8| {
+        let mut lines_of: BTreeMap<usize, usize> = BTreeMap::new();
+        for line in lines {
+            let count = line.text.iter().filter(|byte| *byte == separator).count();
+            *lines_of.entry(count).or_default() += usize::from(count > 0);
+        }
+        lines_of.into_values().max().unwrap_or_default()
+    };
+    let best = |one: u8, other: u8| {
+        if agree(&other) > agree(&one) {
+            other
+        } else {
+            one
+        }
+    };
+    SEPARATORS.into_iter().reduce(best).unwrap_or(b',')
+}
+
+/// The first of the rows, which are the longest run of rows (the last of equal ones), and their usual number of
+/// cells; the number of lines and 0 without a row.
+fn rows(lines: &[Line]) -> (usize, usize) {
+    let mut run = lines.len()..lines.len();
+    let mut at = 0;
+    for same in lines.chunk_by(|one, other| one.is_row() == other.is_row()) {
+        if same[0].is_row() && same.len() >= run.len() {
+            run = at..at + same.len();
+        }
+        at += same.len();
+    }
+    let mut rows_of: BTreeMap<usize, usize> = BTreeMap::new();
+    for line in &lines[run.clone()] {
+        *rows_of.entry(line.names.len()).or_default() += 1;
+    }
+    let usual = rows_of.into_iter().max_by_key(|(_, rows)| *rows);
+    (run.start, usual.map_or(0, |(cells, _)| cells))
 }
 
 /// A cell's text without white space around it. Other text than UTF-8 is Latin-1: older programs write the micro
@@ -118,10 +255,9 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn header(text: &str) -> (usize, Vec<String>) {
+    fn read(text: &str) -> Preamble {
         let is_known = |name: &str| ["a", "b", "c", "d"].contains(&name);
-        let line = find_header(text.as_bytes(), is_known).expect("a header");
-        (line.line, line.names)
+        Preamble::read(text.as_bytes(), Path::new("log"), is_known).expect("a header")
     }
 
     #[test]
@@ -137,16 +273,54 @@ mod tests {
             ("# by hand\n# a,b,c\n1,2,3", 2),
             ("# a,b,c\nrate,500,2\na,b,c\n1,2,3", 3),
         ] {
-            assert_eq!(header(text), (line, names.clone()), "{text:?}");
+            let found = read(text);
+            assert_eq!((found.line, &found.names), (line, &names), "{text:?}");
         }
-        // Without known names: the line above the rows, or the first line that is no comment.
-        assert_eq!(header("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3").0, 3);
-        assert_eq!(
-            header("note\n\n# note\nx,y,z\n2026-01-02T03:04:05,2,3").0,
-            4
-        );
-        assert_eq!(header("# note\n\nx,y\n1,2").0, 3);
-        assert_eq!(header("1,2\n3,4").0, 1);
-        assert!(find_header(b"\n# a\n", |_| true).is_none());
+        // Without known names: the last line of distinct names above the rows, or the first line that is no comment.
+        for (text, line) in [
+            ("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3", 3),
+            ("note\n\n# note\nx,y,z\n2026-01-02T03:04:05,2,3", 4),
+            ("# note\n\nx,y\n1,2", 3),
+            ("x,y,z\nleft,right,left\n1,2,3", 1),
+            ("operator,lab\nx,y,z\n1,2,3\n4,5,6", 2),
+            ("# note\nx,y", 2),
+        ] {
+            assert_eq!(read(text).line, line, "{text:?}");
+        }
+        let problem = |text: &str| {
+            let read = Preamble::read(text.as_bytes(), Path::new("log"), |_| true);
+            read.map(|_| ()).expect_err(text).problem
+        };
+        assert!(matches!(problem("1,2\n3,4"), LogProblem::NoHeader));
+        assert!(matches!(problem("\n# a\n"), LogProblem::Empty));
+    }
+
+    #[test]
+    fn facts_between_header_and_rows_are_passed_over_and_units_found_among_them() {
+        let scope = "Name\tp\tq\nType\tREAL\tREAL\nSampleTime[ms]\t2\t2\nUnit\tnm (Length)\tV (Voltage)\n\n0\t1\t2\n2\t1\t2\n";
+        let found = read(scope);
+        assert_eq!((found.line, found.above), (1, 4));
+        assert_eq!(found.units[1], "nm (Length)");
+        assert!(scope[found.end..].trim_start().starts_with("0\t1"));
+        // Units above the header, rows of facts with numbers, a column without cells.
+        let labview = "Samples\t9\t9\nUnit\tnm\tV\nX0\t0\t0\nX_Value\tp\tq\tComment\n0\t1\t2\n1\t1\t2\n2\t2\t3\n";
+        let found = read(labview);
+        assert_eq!((found.line, found.above, found.cells), (4, 4, 3));
+        assert_eq!(found.units, ["Unit", "nm", "V"]);
+    }
+
+    #[test]
+    fn a_bad_row_is_a_row_wherever_it_stands() {
+        for bad in ["1,x,x", "1,,", ",,"] {
+            let text = format!("a,b,c\n{bad}\n1,2,3\n4,5,6");
+            assert_eq!(read(&text).above, 1, "{bad}");
+        }
+    }
+
+    #[test]
+    fn decimal_commas_do_not_separate_cells() {
+        for text in ["x;y;z\n0,5;1,5;2,5\n1,5;2,5;3,5", "x;y\n0;1,5\n1;2,5"] {
+            assert_eq!(read(text).separator, b';', "{text:?}");
+        }
     }
 }

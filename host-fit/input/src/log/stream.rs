@@ -31,9 +31,9 @@ pub struct LogRow {
 
 /// The rows of a log from start to end. Memory grows only by some bytes for each movement.
 pub struct LogRows<'a> {
-    table: Table<'a>,
-    reader: RowReader<'a>,
-    order: Order,
+    pub(super) table: Table<'a>,
+    pub(super) reader: RowReader<'a>,
+    pub(super) order: Order,
     skipped: Skipped,
     options: ReadOptions,
 }
@@ -107,6 +107,10 @@ impl<'a> LogRows<'a> {
     /// # Errors
     /// The first fault of the log: see [`LogError`].
     pub fn next_row(&mut self) -> Result<Option<LogRow>, LogError> {
+        self.row().map_err(|error| self.named_by_pattern(error))
+    }
+
+    fn row(&mut self) -> Result<Option<LogRow>, LogError> {
         while self.table.next_row()? {
             let (cells, line) = (&self.table.row, self.table.lines.line);
             let movement = self.reader.movement(cells);
@@ -168,6 +172,12 @@ impl<'a> LogRows<'a> {
         if let Some(line) = self.table.open_line {
             let file = file.clone();
             warnings.push(Finding::new(Kind::FileCut { file, line }));
+        }
+        if !columns.unknown.is_empty() {
+            warnings.push(Finding::new(Kind::ColumnsLeftOut {
+                file: file.clone(),
+                columns: columns.unknown.clone(),
+            }));
         }
         if columns.movement.is_none() {
             warnings.push(Finding::new(Kind::MovementsByTime {

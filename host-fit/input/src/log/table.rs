@@ -8,16 +8,13 @@ use super::decimal;
 use super::error::{LogError, LogProblem, Place};
 use super::header::Source;
 use super::lines::{Lines, lines_of};
-use super::preamble::{self, COMMENT};
+use super::preamble::{COMMENT, Preamble};
 use super::record::{Dialect, Record};
-use super::time::{Clock, is_date_time};
+use super::time::{Clock, is_time};
 use super::units;
 use crate::statistics::median;
 use crate::text::TextReader;
 use std::path::PathBuf;
-
-/// Longest unit in a row of units, in characters, with brackets.
-const UNIT_CHARACTERS: usize = 10;
 
 /// Most columns of a table. A table with more is damaged or hostile.
 pub(super) const COLUMNS_MAX: usize = 4096;
@@ -31,26 +28,28 @@ pub struct Head {
     pub line: usize,
     /// Names of the columns, without white space around them.
     pub names: Vec<String>,
-    /// Units of the columns, where a row below the header holds them.
+    /// Units of the columns, where a line above the rows holds them.
     units: Vec<String>,
-    /// Whether the cells of the first row hold date and time.
-    dates: Vec<bool>,
+    /// Whether the cells of the first row hold a time that is no plain number.
+    times: Vec<bool>,
+    /// Fewest cells of a row.
+    cells_min: usize,
 }
 
 impl Head {
-    /// The unit that a row below the header gives for a column, from 0; empty if it gives none.
+    /// The unit that a line above the rows gives for a column, from 0; empty if it gives none.
     pub fn unit(&self, column: usize) -> &str {
-        let unit = self.units.get(column).map_or("", String::as_str);
-        let inside = unit
-            .strip_prefix('[')
-            .and_then(|unit| unit.strip_suffix(']'));
-        let inside = inside.or_else(|| unit.strip_prefix('(')?.strip_suffix(')'));
-        inside.unwrap_or(unit)
+        let unit = self
+            .units
+            .get(column)
+            .map_or("", |unit| units::inside(unit));
+        let is_unit = units::is_known(unit) || units::is_count(unit);
+        if is_unit { unit } else { "" }
     }
 
-    /// Whether a column, from 0, holds date and time in the first row.
-    pub fn is_date(&self, column: usize) -> bool {
-        self.dates.get(column).is_some_and(|is_date| *is_date)
+    /// Whether a column, from 0, holds a date and time or a duration with its unit in the first row.
+    pub fn is_time(&self, column: usize) -> bool {
+        self.times.get(column).is_some_and(|is_time| *is_time)
     }
 
     /// A cell of the row in this line, for messages.
@@ -63,34 +62,6 @@ impl Head {
             movement,
         })
     }
-}
-
-fn check_names(names: &[String]) -> Result<(), LogProblem> {
-    let (limit, text) = (COLUMNS_MAX, |name: &String| shown(name.as_bytes()));
-    match names {
-        names if names.len() > limit => Err(LogProblem::TooManyColumns { limit }),
-        names if preamble::is_numeric(names) => Err(LogProblem::NoHeader),
-        [one] => Err(LogProblem::NoSeparator { text: text(one) }),
-        _ => Ok(()),
-    }
-}
-
-fn texts(row: &Record) -> Vec<String> {
-    row.cells().map(|cell| preamble::text(cell.text)).collect()
-}
-
-/// Whether a row holds the units of the columns: no number, at least two units, and nothing as
-/// long as a remark.
-fn is_units(row: &Record) -> bool {
-    let cells = texts(row);
-    let inside = |cell: &str| cell.trim_matches(['[', ']', '(', ')']).to_owned();
-    let known = |cell: &&String| units::is_known(&inside(cell));
-    let is_number = |cell: &String| cell.parse::<f64>().is_ok();
-    !cells.iter().any(is_number)
-        && cells
-            .iter()
-            .all(|cell| cell.chars().count() <= UNIT_CHARACTERS)
-        && cells.iter().filter(known).count() >= 2
 }
 
 /// Whether a line is neither blank nor a comment.
@@ -112,49 +83,47 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Opens a table, and reads what stands above its rows.
+    /// Opens a table, and reads what stands above its rows: see [`Preamble`].
     ///
-    /// Cells are separated by commas, semicolons or tabs, whichever the header has most;
-    /// lines end in LF, CRLF or CR, a line that starts with `#` is a comment, blank lines are
-    /// skipped. Notes may stand above the header, which is recognised by the names of its
-    /// columns, and a row of units below it. Numbers may have decimal commas where commas do not
-    /// separate cells. All this is decided by the first mebibyte of the text.
+    /// Lines end in LF, CRLF or CR, a line that starts with `#` is a comment, blank lines are skipped. Numbers may
+    /// have decimal commas where commas do not separate cells. A row may have more cells than names, if they are
+    /// empty, and fewer, down to the usual number or the last known name. All this is decided by the first mebibyte
+    /// of the text.
     ///
     /// # Errors
-    /// Errors of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `LineTooLong`.
+    /// Errors of reading and of [`Preamble::read`], `LineTooLong`.
     pub fn open(text: TextReader<'a>, is_known: impl Fn(&str) -> bool) -> Result<Self, LogError> {
         let path = text.path().to_path_buf();
         let mut lines = Lines::new(text);
         let opening = lines.opening()?;
-        let Some(header) = preamble::find_header(opening, is_known) else {
-            return Err(Place::new(path, None).refuse(LogProblem::Empty));
-        };
-        let (line, separator) = (header.line, header.separator);
-        let refused = |problem| Place::new(&path, line).refuse(problem);
-        check_names(&header.names).map_err(refused)?;
-        let rows = opening.get(header.end..).unwrap_or_default();
+        let Preamble {
+            line,
+            above,
+            end,
+            separator,
+            names,
+            units,
+            cells,
+        } = Preamble::read(opening, &path, &is_known)?;
+        let rows = opening.get(end..).unwrap_or_default();
         let mut row = Record::new(Dialect {
             separator,
             decimal_commas: decimal::has_decimal_commas(rows, separator),
         });
-        let (mut units, mut dates, mut above) = (Vec::new(), Vec::new(), line);
-        for below in lines_of(rows).filter(|below| is_row(below.text, separator)) {
-            row.split(below.text);
-            if units.is_empty() && is_units(&row) {
-                units = texts(&row);
-                above = line + below.line;
-            } else {
-                dates = row.cells().map(|cell| is_date_time(cell.text)).collect();
-                break;
-            }
+        let mut times = Vec::new();
+        if let Some(first) = lines_of(rows).find(|line| is_row(line.text, separator)) {
+            row.split(first.text);
+            times = row.cells().map(|cell| is_time(cell.text)).collect();
         }
         while lines.line < above && lines.next_line()?.is_some() {}
+        let known = names.iter().rposition(|name| is_known(name));
         let head = Head {
             path,
             line,
-            names: header.names,
+            cells_min: cells.clamp(known.map_or(0, |last| last + 1), names.len()),
+            names,
             units,
-            dates,
+            times,
         };
         Ok(Self {
             head,
@@ -197,7 +166,7 @@ impl<'a> Table<'a> {
     /// # Errors
     /// Errors of reading, `LineTooLong`, `CellCount`, `CutLine`.
     pub fn next_row(&mut self) -> Result<bool, LogError> {
-        let expected = self.head.names.len();
+        let expected = self.head.cells_min;
         loop {
             let Some(line) = self.lines.next_line()? else {
                 return Ok(false);
@@ -217,9 +186,13 @@ impl<'a> Table<'a> {
                 return refuse(LogProblem::CutLine { expected, found });
             }
         }
-        match found == expected {
+        let mut beyond = self.row.cells().skip(self.head.names.len());
+        match found >= expected && beyond.all(|cell| cell.text.trim_ascii().is_empty()) {
             true => Ok(true),
-            false => refuse(LogProblem::CellCount { expected, found }),
+            false => refuse(LogProblem::CellCount {
+                expected: self.head.names.len(),
+                found,
+            }),
         }
     }
 

@@ -2,6 +2,7 @@ mod accepts;
 mod forms;
 mod long;
 mod movements;
+mod patterns;
 mod refuses;
 mod refuses_files;
 mod skips;

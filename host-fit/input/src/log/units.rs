@@ -18,12 +18,14 @@ const ANGLES: [(&str, f64); 5] = [
     ("nrad", 1e-9),
     ("deg", core::f64::consts::PI / 180.0),
 ];
-/// `iso` is the date and time of ISO 8601, which a cell says by itself; a number is us.
-const TIMES_TO_US: [(&str, f64); 5] = [
+/// `days` are times of spreadsheets; `iso` is a date and time or a duration, which a cell says by itself: a number is
+/// us.
+const TIMES_TO_US: [(&str, f64); 6] = [
     ("s", 1e6),
     ("ms", 1e3),
     ("us", 1.0),
     ("ns", 1e-3),
+    ("days", 8.64e10),
     ("iso", 1.0),
 ];
 const VOLTAGES: [(&str, f64); 3] = [("V", 1.0), ("mV", 1e-3), ("uV", 1e-6)];
@@ -42,9 +44,24 @@ fn plain(symbol: &str) -> Cow<'_, str> {
     }
 }
 
+/// The unit in a cell below a header: without brackets around it, or without a remark in brackets behind it.
+pub(super) fn inside(cell: &str) -> &str {
+    let cell = cell.trim();
+    let bare = cell
+        .strip_prefix('[')
+        .and_then(|cell| cell.strip_suffix(']'));
+    let bare = bare.or_else(|| cell.strip_prefix('(')?.strip_suffix(')'));
+    bare.unwrap_or_else(|| cell.split_once(" (").map_or(cell, |(unit, _)| unit))
+}
+
 /// Whether the symbol stands for no unit.
 pub fn is_count(symbol: &str) -> bool {
     COUNTS.contains(&symbol.trim())
+}
+
+/// Whether the symbol says that a time counts rows.
+pub fn is_rows(symbol: &str) -> bool {
+    ["row", "rows", "sample", "samples"].contains(&symbol.trim())
 }
 
 /// Whether the symbol is a unit of any kind.
@@ -89,9 +106,10 @@ impl Dimension {
     /// Its units, as messages list them.
     pub fn units(self) -> String {
         let symbols: Vec<&str> = self.table().iter().map(|(symbol, _)| *symbol).collect();
-        match symbols[..] {
-            [] => "none".to_owned(),
-            _ => symbols.join(", "),
+        match (self, symbols.join(", ")) {
+            (Self::Index, _) => "none".to_owned(),
+            (Self::Time, symbols) => symbols + ", rows",
+            (_, symbols) => symbols,
         }
     }
 

@@ -27,9 +27,13 @@ const VOLTS_PER_COUNT: (f64, f64) = (1e-9, 10.0);
 
 /// The layout that the table describes; quantities that it leaves out keep their default, as all
 /// do without the table.
-pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageError> {
+pub(super) fn log_layout(
+    document: &Document<'_>,
+    servo_period_s: f64,
+) -> Result<LogLayout, StageError> {
     let volts = |table| document.number(table, "volts_per_count", VOLTS_PER_COUNT, "V per code");
     let mut layout = LogLayout::default();
+    layout.row_us = servo_period_s * 1e6;
     layout.hall_volts_per_count = volts("hall")?;
     layout.capacitive_volts_per_count = volts("capacitive")?;
     let mut mapped: Vec<(Quantity, Value<'_>)> = Vec::new();

@@ -63,6 +63,7 @@ impl Stage {
         let probes = designed_probes(document)?;
         let capacitive = code_scale(document, "capacitive")?;
         let uncertainty = uncertainty::uncertainty(document)?;
+        let servo_period_s = document.required("servo", "period_s", PERIODS_S, "s")?;
         let stage = Self {
             probes,
             hall: code_scale(document, "hall")?,
@@ -71,13 +72,13 @@ impl Stage {
             interferometer: beams::interferometer(document)?,
             reset_sd: reset_sd(document)?,
             latency_s: latency_s(document)?,
-            servo_period_s: document.required("servo", "period_s", PERIODS_S, "s")?,
+            servo_period_s,
             search: search::ranges(document, &probes, &uncertainty)?,
             motion: motion::motion(document)?,
             temperature: temperature::temperature(document)?,
             uncertainty,
             certificate: certificate::certificate(document)?,
-            log: columns::log_layout(document)?,
+            log: columns::log_layout(document, servo_period_s)?,
         };
         Ok(stage)
     }

@@ -9,6 +9,8 @@ use hal_adapters::candump::{LineError, LogLine};
 use hallstage_input::log::LogError;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
+use hallstage_input::other_format;
+use hallstage_input::source::{SourceError, SourceProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 use hallstage_input::watch::Watch;
@@ -111,11 +113,24 @@ impl BusReader<'_> {
                 self.counts.bad_lines += 1;
                 Ok(())
             }
-            Err(fault) => Err(ImportError::BadLine {
-                path: self.settings.bus.clone(),
+            Err(fault) => Err(self.bad_line(line, fault)),
+        }
+    }
+
+    /// The error of a line, which may show that the file is no record of candump.
+    fn bad_line(&self, line: &str, fault: LineError) -> ImportError {
+        let path = self.settings.bus.clone();
+        let other = other_format::in_text(line.as_bytes());
+        match other.filter(|_| self.line == 1 && !line.trim_ascii().starts_with('(')) {
+            Some(looks_like) => {
+                let problem = SourceProblem::OtherFormat { looks_like };
+                LogError::from(SourceError { path, problem }).into()
+            }
+            None => ImportError::BadLine {
+                path,
                 line: self.line,
                 fault,
-            }),
+            },
         }
     }
 

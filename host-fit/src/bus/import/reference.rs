@@ -2,7 +2,7 @@
 
 use super::ImportError;
 use hallstage_input::log::cell::{CellFault, WHOLE_MAX};
-use hallstage_input::log::header::{Header, Source, UnknownColumns};
+use hallstage_input::log::header::{Header, Source};
 use hallstage_input::log::layout::{Dimension, Quantity};
 use hallstage_input::log::order::{Order, OrderCells};
 use hallstage_input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
@@ -152,7 +152,7 @@ impl Reference {
 impl Cells {
     /// The beams, or X, Y, Rz where the log has those.
     fn find(table: &Table<'_>, stage: &Stage) -> Result<([Quantity; 3], Self), LogError> {
-        let header = Header::new(&table.head, &stage.log, UnknownColumns::LeaveOut)?;
+        let header = Header::new(&table.head, &stage.log)?;
         let [time] = header.all([Quantity::Time])?;
         let (quantities, [a, b, c]) = header.one_of(&Quantity::REFERENCES)?;
         let value = |quantity: Quantity, source: Source| {

@@ -40,7 +40,7 @@ fn units_stand_in_the_header_in_every_spelling() {
     // A default name with a unit is no other's once [log] names a column for the quantity.
     let mapped = stage_with("ifm_x = \"laser_nm\"");
     let other = LOG.replace("ifm_x_nm", "ifm_x [nm]");
-    refused_with(&other, &mapped, &["(ifm_x [nm]): it is unknown"]);
+    refused_with(&other, &mapped, &["`laser_nm` is missing", "ifm_x [nm]"]);
     // A name in [log] stands in the header, letter for letter, and has the unit.
     let mapped = stage_with(
         "ifm_x = \"X [um]\"\nifm_y1 = \"Y left/um\"\nifm_y2 = { column = \"Y (right)\", unit = \"\u{b5}m\" }",
@@ -76,13 +76,9 @@ fn a_row_of_units_below_the_header_tells_them_or_agrees() {
         );
     }
     // What is no row of units is a row with bad cells.
-    for row in [
-        "-,us,nm,nm,nm,cnt,cnt,cnt,cnt,cnt,1",
-        "a,b,c,d,e,f,g,h,i,j,k",
-    ] {
-        let error = refused_with(&with_units(LOG, row), stage(), &["not a number"]);
-        assert_eq!(place(&error).0, 2);
-    }
+    let bad = with_units(LOG, "0,us,nm,nm,nm,cnt,cnt,cnt,cnt,cnt,1");
+    let error = refused_with(&bad, stage(), &["no time"]);
+    assert_eq!(place(&error).0, 2);
     refused_with(
         &with_units(&bare, ",us,,um,um,,,,,,"),
         stage(),
@@ -235,4 +231,114 @@ fn voltages_become_the_codes_of_the_converter() {
     let far = in_volts.replace("0.030312", "11.0");
     let error = refused_with(&far, &stage, &["outside the converter's range"]);
     assert_eq!(place(&error).1, 9);
+}
+
+/// The cells of each line, with another function for the header.
+fn lines(header: impl Fn(&str) -> String, row: impl Fn(usize, &str) -> String) -> String {
+    let mut all = LOG.lines();
+    let header = header(all.next().expect("a header"));
+    let rows = all.enumerate().map(|(k, line)| row(k, line) + "\n");
+    header + "\n" + &rows.collect::<String>()
+}
+
+#[test]
+fn columns_without_name_cells_or_meaning_are_left_out_with_a_note() {
+    // An index of pandas, separators at the ends of rows or of the header, a column of remarks.
+    for (text, left_out) in [
+        (
+            lines(|header| format!(",{header}"), |k, row| format!("{k},{row}")),
+            "column 1 without a name",
+        ),
+        (
+            lines(
+                |header| format!("{header},Comment"),
+                |_, row| row.to_owned(),
+            ),
+            "Comment",
+        ),
+        (
+            lines(|header| format!("{header},"), |_, row| row.to_owned()),
+            "column 12 without a name",
+        ),
+        (
+            lines(
+                |header| format!("{header},operator"),
+                |k, row| format!("{row},{}", if k > 3 { "ab" } else { "" }),
+            ),
+            "operator",
+        ),
+    ] {
+        let reading = sound(&text);
+        let Some(Kind::ColumnsLeftOut { columns, .. }) =
+            reading.warnings.first().map(|found| &found.kind)
+        else {
+            panic!("{:?}: {text}", reading.warnings);
+        };
+        assert_eq!(columns, &[left_out], "{text}");
+        assert_eq!(reading.dataset.rows.len(), 6);
+    }
+    same_rows(lines(str::to_owned, |_, row| format!("{row},")), stage());
+}
+
+#[test]
+fn a_file_of_labview_is_read() {
+    let head = "LabVIEW Measurement\t\r\nSeparator\tTab\r\n***End_of_Header***\t\r\n\t\r\nChannels\t10\t\t\r\n";
+    let samples = |tag: &str, value: &str| format!("{tag}\t{}\r\n", [value; 10].join("\t"));
+    let units = "Y_Unit_Label\tus\tnm\tnm\tnm\t-\t-\t-\t-\t-\t-\r\n";
+    let head = head.to_owned()
+        + &samples("Samples", "6")
+        + &samples("Date", "2026/05/12")
+        + units
+        + &samples("X0", "0.0E+0")
+        + &samples("Delta_X", "0.002")
+        + "***End_of_Header***\t\r\n";
+    let table = lines(
+        |header| header.replace("_nm", "") + "\tComment",
+        |_, row| row.to_owned(),
+    );
+    same_rows_but_notes(&(head + &table.replace(',', "\t").replace('\n', "\r\n")));
+}
+
+/// As `same_rows`, with columns that are left out.
+#[track_caller]
+fn same_rows_but_notes(text: &str) {
+    let reading = read_text(text, &ReadOptions::default()).expect("read");
+    let is_note = |found: &Finding| found.severity == Severity::Note;
+    assert!(
+        reading.warnings.iter().all(is_note),
+        "{:?}",
+        reading.warnings
+    );
+    let want = sound(LOG).dataset.rows;
+    let places = |rows: &[Row]| {
+        rows.iter()
+            .map(|row| (row.t_us, row.reference))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(places(&reading.dataset.rows), places(&want));
+}
+
+#[test]
+fn times_are_dates_durations_or_numbers_of_rows() {
+    let time = |name: &str, text: &dyn Fn(usize) -> String| {
+        lines(
+            |header| header.replace("t_us", name),
+            |k, row| {
+                let cells: Vec<&str> = row.split(',').collect();
+                format!("{},{},{}", cells[0], text(k % 3), cells[2..].join(","))
+            },
+        )
+    };
+    let named = |name: &str, text: &dyn Fn(usize) -> String| {
+        let reading = sound(&time(name, text));
+        let times = reading.dataset.rows.iter().map(|row| row.t_us);
+        times.collect::<Vec<_>>()
+    };
+    let day = |k: usize| format!("12.05.2026 10:00:00.00{}", 2 * k);
+    let times = named("Timestamp", &day);
+    assert_eq!(times[2] - times[1], 2000);
+    let times = named("time", &|k| format!("0.00{} sec", 2 * k));
+    assert_eq!(times, [0, 2000, 4000, 0, 2000, 4000]);
+    assert_eq!(named("time [rows]", &|k| k.to_string()), times);
+    assert_eq!(named("Zeit (ms)", &|k| (2 * k).to_string()), times);
 }

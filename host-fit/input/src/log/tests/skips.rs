@@ -77,7 +77,7 @@ fn a_wrong_structure_is_refused_all_the_same() {
         ("97,87,-6", "97,87", "10 cells"),
         ("150,2\n", "", "ends in the middle"),
         ("\n4,2000,-871", "\n4,-1,x", "backwards"),
-        ("hall_b_cnt", "hall_d_cnt", "unknown"),
+        ("hall_b_cnt", "hall_d_cnt", "not known"),
     ] {
         let error = read_text(&spoilt(old, new), &SKIP).expect_err(part);
         assert!(error.to_string().contains(part), "{error}");

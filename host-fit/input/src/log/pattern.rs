@@ -1,0 +1,207 @@
+//! A fault that many rows share is named by its pattern, for no single row is to blame.
+
+use super::cell::CellFault;
+use super::error::{LogError, LogProblem};
+use super::stream::LogRows;
+use std::mem::discriminant;
+
+/// Most rows that are read on after the first fault.
+const ROWS_MAX: usize = 100_000;
+/// Fewest rows with the same fault, and their smallest share, 1 in so many, that make a pattern.
+const ROWS_MIN: usize = 10;
+const ONE_IN: usize = 20;
+/// Bits of the counters of clocks.
+const COUNTER_BITS: [i32; 3] = [16, 24, 32];
+
+/// What is wrong with a column of a log, or with all of its rows.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Pattern {
+    /// Times repeat, because they have too few digits.
+    #[error(
+        "the row repeats the time of the row above, because the times have too few digits; write all digits, or read the number of the row with `time = {{ column = \"..\", unit = \"rows\" }}` in the [log] table of stage.toml"
+    )]
+    CoarseTimes,
+    /// Negative codes are written as large ones.
+    #[error(
+        "the codes have no sign: negative ones are written as {bits}-bit numbers; subtract 2^{bits} from the codes above {code_max}"
+    )]
+    NoSign {
+        /// Bits of the converter.
+        bits: u32,
+        /// Its largest code.
+        code_max: i32,
+    },
+    /// Codes count from the lowest one.
+    #[error(
+        "the codes count from the lowest one (offset binary); subtract {} from each code",
+        code_max + 1
+    )]
+    OffsetBinary {
+        /// The largest code of the converter.
+        code_max: i32,
+    },
+    /// Other codes than the converter's.
+    #[error(
+        "codes are outside the converter's range; correct code_min and code_max in stage.toml, or record the codes of this converter"
+    )]
+    OtherCodes,
+    /// Numbers with a fraction in a column of codes or of movements.
+    #[error(
+        "the numbers are not whole; if they are voltages or lengths, give their unit with `{{ column = \"..\", unit = \"..\" }}` in the [log] table of stage.toml"
+    )]
+    NotCodes,
+    /// No numbers.
+    #[error(
+        "the cells are no numbers, such as \"{text}\"; write decimal numbers with points, without marks between thousands, or name another column in the [log] table of stage.toml"
+    )]
+    NotNumbers {
+        /// The text of the first cell, shortened.
+        text: String,
+    },
+    /// Most cells are empty.
+    #[error(
+        "the cells are empty or NaN; record each quantity in each row, or name another column in the [log] table of stage.toml"
+    )]
+    Empty,
+    /// Numbers that are too large.
+    #[error(
+        "the numbers are too large; correct the unit or the scale of the column in the [log] table of stage.toml"
+    )]
+    TooLarge,
+    /// Codes at a rail.
+    #[error(
+        "codes are at the converter's rail; check the sensor, its cable and the range of the converter, and record the log again"
+    )]
+    Saturated,
+    /// Other numbers of cells than the header.
+    #[error(
+        "the rows have {found} cells and the header {expected}; if the numbers have decimal commas, separate the cells by semicolons or tabs"
+    )]
+    CellCount {
+        /// Cells of the header.
+        expected: usize,
+        /// Cells of the first row with another number of them.
+        found: usize,
+    },
+}
+
+impl LogRows<'_> {
+    /// The error of a log, named by its pattern where many rows have the same fault; reads on to count them.
+    pub(super) fn named_by_pattern(&mut self, error: LogError) -> LogError {
+        if let LogProblem::TimeBackwards { before_us, t_us } = error.problem {
+            let wraps = self.counter_bits((before_us - t_us) as f64);
+            let problem = wraps.map(|bits| LogProblem::ClockWraps { bits });
+            return error.place.refuse(problem.unwrap_or(error.problem));
+        }
+        if !matches!(
+            error.problem,
+            LogProblem::Cell(_) | LogProblem::DuplicatedRow { .. } | LogProblem::CellCount { .. }
+        ) {
+            return error;
+        }
+        let column = error.place.column.as_ref().map(|(column, _)| column - 1);
+        let (mut rows, mut faults) = (1, 1);
+        let mut before_us = f64::NAN;
+        let mut numbers = Vec::new();
+        while rows < ROWS_MAX {
+            let found = match self.table.next_row() {
+                Ok(false) => break,
+                Ok(true) => {
+                    let t_us = self.reader.t_us(&self.table.row);
+                    let above_us = before_us;
+                    before_us = *t_us.as_ref().unwrap_or(&before_us);
+                    match t_us.and_then(|t_us| self.reader.row(&self.table.row, t_us as i64)) {
+                        Err(bad) => Some((bad.cell, bad.fault.into())),
+                        Ok(row) if before_us == above_us => {
+                            let repeats = LogProblem::DuplicatedRow { t_us: row.t_us };
+                            column.map(|time| (time, repeats))
+                        }
+                        Ok(_) => None,
+                    }
+                }
+                Err(LogError { problem, .. }) => Some((usize::MAX, problem)),
+            };
+            rows += 1;
+            let is_same = |(cell, problem): (usize, LogProblem)| {
+                cell == column.unwrap_or(usize::MAX) && problem.is_like(&error.problem)
+            };
+            faults += usize::from(found.is_some_and(is_same));
+            numbers.extend(column.and_then(|cell| self.table.row.cell(cell).number().ok()));
+        }
+        let pattern = match &error.problem {
+            LogProblem::DuplicatedRow { .. } => Some(Pattern::CoarseTimes),
+            LogProblem::CellCount { expected, found } => {
+                let (expected, found) = (*expected, *found);
+                Some(Pattern::CellCount { expected, found })
+            }
+            LogProblem::Cell(fault) => Pattern::of_cells(fault, &numbers),
+            _ => None,
+        };
+        match pattern {
+            Some(pattern) if faults >= ROWS_MIN && faults * ONE_IN >= rows => {
+                error.place.refuse(LogProblem::Pattern {
+                    faults,
+                    rows,
+                    pattern,
+                })
+            }
+            _ => error,
+        }
+    }
+
+    /// The bits of a counter that is full at this step back in time.
+    fn counter_bits(&self, fall_us: f64) -> Option<i32> {
+        let unit_us = self.reader.columns.time.scale;
+        let off = |bits: &i32| (fall_us - 2f64.powi(*bits) * unit_us).abs();
+        COUNTER_BITS
+            .into_iter()
+            .find(|bits| off(bits) <= 2.0 * self.order.period_us)
+    }
+}
+
+impl LogProblem {
+    /// Whether it is the same problem of another row.
+    fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Cell(one), Self::Cell(other)) => one.reason() == other.reason(),
+            _ => discriminant(self) == discriminant(other),
+        }
+    }
+}
+
+impl Pattern {
+    /// Of a column with this fault in many cells and these numbers in the others.
+    fn of_cells(fault: &CellFault, numbers: &[f64]) -> Option<Self> {
+        Some(match fault {
+            CellFault::Empty | CellFault::Nan => Self::Empty,
+            CellFault::NotANumber { text } | CellFault::DecimalPoint { text } => {
+                Self::NotNumbers { text: text.clone() }
+            }
+            CellFault::NotWhole { .. } => Self::NotCodes,
+            CellFault::Absurd { .. } => Self::TooLarge,
+            CellFault::Saturated { .. } => Self::Saturated,
+            CellFault::OutsideConverter { code_max, .. } => Self::of_codes(numbers, *code_max),
+            CellFault::Infinite { .. }
+            | CellFault::NotATime { .. }
+            | CellFault::OtherTime { .. } => return None,
+        })
+    }
+
+    /// Of codes that this converter cannot give: a sound log crosses zero in small steps.
+    fn of_codes(codes: &[f64], code_max: i32) -> Self {
+        let half = f64::from(code_max) + 1.0;
+        if !codes.iter().all(|code| (0.0..2.0 * half).contains(code)) {
+            return Self::OtherCodes;
+        }
+        let jumps = codes
+            .windows(2)
+            .any(|pair| (pair[1] - pair[0]).abs() > half);
+        match jumps || codes.iter().all(|code| *code > 1.5 * half) {
+            true => Self::NoSign {
+                bits: code_max.ilog2() + 2,
+                code_max,
+            },
+            false => Self::OffsetBinary { code_max },
+        }
+    }
+}

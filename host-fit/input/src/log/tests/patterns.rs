@@ -1,0 +1,159 @@
+//! Faults that many rows share.
+
+use super::*;
+
+/// A sound log of 200 rows, a cell of each changed.
+fn long(column: usize, change: impl Fn(usize, i64) -> String) -> String {
+    let header = LOG.lines().next().expect("a header");
+    let row = |k: usize| {
+        let wave = |to: f64| (to * (k as f64 / 20.0).sin()) as i64;
+        let cells = [
+            0,
+            2000 * k as i64,
+            wave(5e4),
+            wave(6e4),
+            wave(6e4),
+            wave(90.0),
+            wave(80.0),
+            wave(70.0),
+            wave(3e3),
+            wave(4e3),
+            wave(2e3),
+        ];
+        let text = cells
+            .iter()
+            .enumerate()
+            .map(|(at, cell)| match at == column {
+                true => change(k, *cell),
+                false => cell.to_string(),
+            });
+        text.collect::<Vec<_>>().join(",") + "\n"
+    };
+    header.to_owned() + "\n" + &(0..200).map(row).collect::<String>()
+}
+
+fn pattern(text: &str) -> Pattern {
+    let error = read_text(text, &ReadOptions::default()).expect_err("refused");
+    let LogProblem::Pattern { pattern, .. } = error.problem else {
+        panic!("{error}");
+    };
+    pattern
+}
+
+#[test]
+fn a_fault_of_many_rows_is_named_by_its_pattern() {
+    assert!(read_text(&long(99, |_, _| String::new()), &ReadOptions::default()).is_ok());
+    let second = |k: usize, _| format!("2026-05-12T10:00:{:02}", k / 100);
+    assert_eq!(
+        pattern(&long(1, second).replace("t_us", "Time")),
+        Pattern::CoarseTimes
+    );
+    assert_eq!(
+        pattern(&long(1, |k, _| (k / 5 * 10_000).to_string())),
+        Pattern::CoarseTimes
+    );
+    let no_sign = Pattern::NoSign {
+        bits: 16,
+        code_max: 32767,
+    };
+    assert_eq!(
+        pattern(&long(8, |_, code| (code & 0xffff).to_string())),
+        no_sign
+    );
+    let offset = Pattern::OffsetBinary { code_max: 32767 };
+    assert_eq!(
+        pattern(&long(8, |_, code| (code + 32768).to_string())),
+        offset
+    );
+    assert_eq!(
+        pattern(&long(8, |_, code| (code + 90_000).to_string())),
+        Pattern::OtherCodes
+    );
+    assert_eq!(
+        pattern(&long(8, |_, code| format!("{:.3}", code as f64 / 3.1e3))),
+        Pattern::NotCodes
+    );
+    assert_eq!(
+        pattern(&long(2, |_, nm| format!("0x{nm:x}"))),
+        Pattern::NotNumbers {
+            text: "0x0".to_owned()
+        }
+    );
+    assert_eq!(
+        pattern(&long(2, |k, nm| if k % 4 == 0 {
+            nm.to_string()
+        } else {
+            String::new()
+        })),
+        Pattern::Empty
+    );
+    assert_eq!(
+        pattern(&long(2, |_, nm| (nm * 1_000_000).to_string())),
+        Pattern::TooLarge
+    );
+    assert_eq!(
+        pattern(&long(9, |_, _| "32767".to_owned())),
+        Pattern::Saturated
+    );
+    let cells = Pattern::CellCount {
+        expected: 11,
+        found: 12,
+    };
+    assert_eq!(pattern(&long(2, |_, nm| format!("{},5", nm / 1000))), cells);
+}
+
+#[test]
+fn a_fault_of_few_rows_is_the_fault_of_its_row() {
+    let error = refused(&long(8, |k, code| {
+        if k % 25 == 7 {
+            "x".to_owned()
+        } else {
+            code.to_string()
+        }
+    }));
+    assert!(
+        matches!(
+            error.problem,
+            LogProblem::Cell(CellFault::NotANumber { .. })
+        ),
+        "{error}"
+    );
+    let error = refused(&long(1, |k, t_us| {
+        if k == 7 {
+            "12000".to_owned()
+        } else {
+            t_us.to_string()
+        }
+    }));
+    assert!(
+        matches!(error.problem, LogProblem::DuplicatedRow { .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_clock_that_is_full_is_named_with_its_bits() {
+    for (bits, unit) in [(32, "us"), (24, "us"), (16, "ms")] {
+        let per_row = if unit == "us" { 2000 } else { 2 };
+        let full = 1i64 << bits;
+        let text = long(1, |k, _| {
+            ((full - 100 + per_row * k as i64) % full).to_string()
+        });
+        let error = refused(&text.replace("t_us", &format!("time [{unit}]")));
+        assert!(
+            matches!(error.problem, LogProblem::ClockWraps { bits: found } if found == bits),
+            "{error}"
+        );
+    }
+    let back = refused(&long(1, |k, t_us| {
+        if k == 90 {
+            "5".to_owned()
+        } else {
+            t_us.to_string()
+        }
+    }));
+    assert!(
+        matches!(back.problem, LogProblem::TimeBackwards { .. }),
+        "{back}"
+    );
+}
