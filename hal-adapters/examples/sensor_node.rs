@@ -5,7 +5,6 @@
 //! cargo run -p hal-adapters --example sensor_node
 //! ```
 
-use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{MODE_1, Mode};
 use hal_adapters::adc::{AdcError, FrameSampler};
 use hal_adapters::can::sensor::TemperatureSender;
@@ -35,18 +34,17 @@ fn run<S: FrameSampler>(
     mut send: impl FnMut(u32, BusFrame),
 ) -> Result<(), AdcError<S::Bus>> {
     let mut temperatures = TemperatureSender::START;
-    converter.start(&mut Sleep)?;
+    converter.start()?;
     for sequence in 0..ticks {
         // A real node is woken by a timer, on an absolute schedule.
-        converter.trigger(&mut Sleep)?;
-        Sleep.delay_us(S::SETTLE_US);
-        let time_us = sequence * PERIOD_US + S::SAMPLE_US;
-        let frame = converter.sample(sequence, time_us)?;
+        converter.trigger()?;
+        std::thread::sleep(Duration::from_micros(S::SETTLE_US.into()));
+        let frame = converter.sample(sequence)?;
         let temperatures = temperatures.frame(&frame).into_iter();
         let layout = Layout::from_bits(S::CODE_BITS);
         for coded in temperatures.chain(sensor::frames(layout, &frame)) {
             // On a controller: `coded.to_frame()` gives the frame type of its driver.
-            send(time_us, BusFrame::from(coded));
+            send(frame.time_us, BusFrame::from(coded));
         }
     }
     Ok(())
@@ -60,27 +58,18 @@ impl FrameSampler for Simulated {
     const SPI_MODE: Mode = MODE_1;
     const SPI_HZ_MAX: u32 = 10_000_000;
     const SETTLE_US: u32 = 10;
-    const SAMPLE_US: u32 = 5;
     const CODE_BITS: u32 = 16;
 
-    fn start(&mut self, _: &mut impl DelayNs) -> Result<(), AdcError<Infallible>> {
+    fn start(&mut self) -> Result<(), AdcError<Infallible>> {
         Ok(())
     }
 
-    fn trigger(&mut self, _: &mut impl DelayNs) -> Result<(), AdcError<Infallible>> {
+    fn trigger(&mut self) -> Result<(), AdcError<Infallible>> {
         Ok(())
     }
 
-    fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<Infallible>> {
+    fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<Infallible>> {
         let (hall, gaps) = ([0, 100, 200], [300, 400, 500]);
-        Ok(RawFrame::new(hall, gaps, sequence, time_us))
-    }
-}
-
-struct Sleep;
-
-impl DelayNs for Sleep {
-    fn delay_ns(&mut self, ns: u32) {
-        std::thread::sleep(Duration::from_nanos(ns.into()));
+        Ok(RawFrame::new(hall, gaps, sequence, sequence * PERIOD_US))
     }
 }

@@ -1,5 +1,5 @@
 //! Texas Instruments ADS131M08: eight channels of 24 bits, sampled at once (data sheet
-//! SBAS950).
+//! SBAS950B).
 //!
 //! Every exchange is a frame of ten words of 24 bits, most significant bit first, SPI mode 1,
 //! up to 25 MHz: command, seven words and a check from here; the response to the *previous*
@@ -15,31 +15,44 @@
 //! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 256, high resolution |
 //! | the others | 0x04 to 0x30 | | as after reset |
 //!
-//! **Which conversion is read.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a conversion
-//! takes 64 us. Three of them after a resynchronisation the filters are settled. The sheet does not
-//! say whether conversions end at multiples of 64 us after SYNC or 11 us later (44 modulator periods, table 8-3; 300
-//! after a reset, 8.4.2), whether unsettled conversions are held back, which of three conversions a full store of two
-//! loses, and whether a conversion is removed when its frame begins or ends. A tick relies on none of this:
+//! **Which conversion is read, and when it was sampled.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a
+//! conversion takes 64 us. DRDY falls as a conversion ends, while no frame is on the bus (8.5.1.5).
 //!
 //! 1. A pulse on SYNC/RESET at the trigger restarts the filters of all channels.
-//! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 207 us later a frame removes the older of the two
-//!    conversions that may be stored. It ends before the next conversion does, at 256 us, so there is room for that
-//!    conversion.
-//! 3. A second frame removes the other. The third carries the conversion that ended 256 or 267 us
-//!    after the trigger, settled in any case. If it is not there yet, the ready bits say so, and a fourth
-//!    frame carries it.
+//! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 207 us later the last edge of DRDY gives the ends of all conversions, those
+//!    to come as well. The period between edges is measured at the start.
+//! 3. Frames empty the store of two conversions. The driver follows the store by the times of frames and conversions
+//!    (`conversions.rs`), and returns the first codes with a known conversion, settled in any case: 3.5 periods
+//!    after the trigger. (By table 8-3 a filter may begin 75 us after a resynchronisation; 8.5.2 wants three periods.)
 //!
-//! This holds whichever way the part goes, with gaps of 1 to 8 us before each frame of 23 us (5 us if it
-//! takes 30), and if the first begins 3 us early or late. The codes are the mean, weighted by the sinc3
-//! filter, of the 192 us before: the middle is 160 or 171 us after the trigger, and [`SAMPLE_US`](FrameSampler::SAMPLE_US) =
-//! 166 us is within 6 us of both (0.03 um at the fastest motion of a service log, 4.8 mm/s).
+//! The codes are the mean, weighted by the sinc3 filter, of the three periods before. The sheet does not say whether an edge
+//! comes up to 44 periods of the modulators (11 us) after its last sample, as in equation 9: the time of a sample is in the
+//! middle of both, and right to 6 us and the jitter of the clock. A sample that is not known to 10 us is refused
+//! ([`AdcError::UnknownInstant`]): DRDY is not wired, CLKIN is not within 6 % of 8 MHz by the clock of the controller,
+//! a frame was interrupted or is too slow. So the controller's own oscillator may be 4 % off, and CLKIN may be 8.192 MHz.
 //!
-//! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
+//! A frame of a full store must lie between two conversions: it may take 58 us with the gap between the look at the clock and
+//! chip select. **So the least SPI clock is 4.2 MHz**; below it every sample is refused. Frames that take longer than
+//! 45 us wait for the end of a conversion first, for one frame at most.
+//!
+//! By the model of the part, in all eight behaviours where the sheet is silent: the largest error of the time of a sample,
+//! and the samples that are refused, with one interruption of this length in a ms (`cargo test -p bench driver`):
+//!
+//! | SPI, gap before each frame | never interrupted | 10 us | 30 us | 100 us |
+//! |---|---|---|---|---|
+//! | 1 MHz, any; 4 MHz, any | all refused | all refused | all refused | all refused |
+//! | 5.25 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 12 % | 5.9 us, 16 % |
+//! | 5.25 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 5 % | 5.9 us, 12 % | 5.9 us, 16 % |
+//! | 5.25 MHz, 20 and 50 us | all refused | all refused | all refused | all refused |
+//! | 10 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 1 % | 5.9 us, 14 % |
+//! | 10 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 5 % | 5.9 us, 10 % |
+//! | 10 MHz, 20 us | 5.9 us, 0 % | 5.9 us, 2 % | 5.9 us, 10 % | 5.9 us, 12 % |
+//! | 10 MHz, 50 us | all refused | all refused | all refused | all refused |
+//!
+//! A pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
 //! ignores a pulse that coincides with the end of a conversion, which then is settled anyway. At
-//! 8.000 MHz 2 ms are 31.25 conversions, so that only a tick that comes late can meet one. **At
-//! 8.192 MHz** 2 ms are 32 conversions, and a part that is in step would ignore all pulses: one that
-//! comes after an ignored pulse comes 2 us late, which restarts the filters. Conversions then end at
-//! 250 or 261 us, 10 us before [`SAMPLE_US`](FrameSampler::SAMPLE_US) says at most.
+//! 8.192 MHz 2 ms are 32 conversions, and a part that is in step would ignore all pulses: one that
+//! comes after an ignored pulse comes 2 us late, which restarts the filters.
 //!
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
@@ -60,11 +73,14 @@
 //! is a code like any other: see the wiring table of the firmware for the resistor that makes it
 //! read a rail.
 
+mod conversions;
+
 use super::channels::INPUTS;
 use super::thermometer::{AnalogInput, Held};
-use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
+use super::{AdcError, Channels, DataReady, FrameSampler, check_id, compare, silent};
+use conversions::Conversions;
+use core::ops::RangeInclusive;
 use crc::{CRC_16_IBM_3740, Crc};
-use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
@@ -112,18 +128,38 @@ const F_RESYNC: u16 = 0x4000;
 const UNSYNCED_TICKS: u8 = 2;
 
 /// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
-const SYNC_US: u32 = 1;
+const SYNC_US: u32 = 2;
 /// By this much a pulse comes later that follows an ignored one.
 const SHIFT_US: u32 = 2;
 
 /// The registers can be accessed 5 us (typical) after a reset.
 const RESET_US: u32 = 10;
 
-/// The part on its bus, with its pin SYNC/RESET.
+/// A conversion, ns, with CLKIN at 8 MHz.
+const PERIOD_NS: u32 = 64_000;
+/// The measured period lies in this range.
+const PERIODS_NS: RangeInclusive<u32> = 60_000..=68_000;
+/// Time in which the period is measured: four conversions.
+const MEASURE_US: u32 = 260;
+/// Among more periods one that is 6 % off would be miscounted.
+const COUNT_MAX: u32 = 8;
+/// From a change of the oversampling until the first edge has come in any case, us.
+const FIRST_EDGE_US: u32 = 200;
+/// By a clock that is 6 % fast an edge comes this much later, us.
+const SLOW_EDGE_US: u32 = 12;
+/// From the last sample of a conversion to its edge, ns: 0 or 11 us.
+const EDGE_LATE_NS: u32 = 5_500;
+/// Frames of a sample, at most.
+const FRAMES_MAX: usize = 6;
+/// Looks at the clock until a wait is given up, because the clock stands.
+const LOOKS_MAX: u32 = 100_000;
+
+/// The part on its bus, with its pins SYNC/RESET and DRDY.
 #[derive(Debug)]
-pub struct Ads131m08<SPI, SYNC> {
+pub struct Ads131m08<SPI, SYNC, READY> {
     spi: SPI,
     sync: SYNC,
+    ready: READY,
     channels: Channels,
     /// Register that the next tick reads back.
     turn: u8,
@@ -132,32 +168,42 @@ pub struct Ads131m08<SPI, SYNC> {
     unsynced_ticks: u8,
     start_failed: bool,
     temperatures: Held,
+    triggered_us: u32,
+    period_ns: u32,
+    /// Length of the last frame.
+    frame_us: u32,
 }
 
-/// What the part sent in one frame.
+/// What the part sent in one frame, and when.
 struct Frame {
     response: u16,
     codes: [i32; INPUTS],
+    from_us: u32,
+    to_us: u32,
 }
 
-impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
+impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, READY> {
     /// An input, as the source of its voltage sees it.
     pub const INPUT: AnalogInput = AnalogInput {
         codes_per_v: 8_388_608.0 / 1.2,
         ohm: 330e3,
     };
 
-    /// A part that is not started yet; `sync` drives SYNC/RESET.
-    pub const fn new(spi: SPI, sync: SYNC, channels: Channels) -> Self {
+    /// A part that is not started yet; `sync` drives SYNC/RESET, `ready` sees DRDY.
+    pub const fn new(spi: SPI, sync: SYNC, ready: READY, channels: Channels) -> Self {
         Self {
             spi,
             sync,
+            ready,
             channels,
             turn: MODE_REGISTER,
             status_is_next: false,
             unsynced_ticks: 0,
             start_failed: false,
             temperatures: Held::MISSING,
+            triggered_us: 0,
+            period_ns: PERIOD_NS,
+            frame_us: 0,
         }
     }
 
@@ -166,9 +212,12 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         let mut words = [[0; WORD_BYTES]; WORDS];
         let ([c0, c1], [d0, d1]) = (command.to_be_bytes(), data.to_be_bytes());
         [words[0], words[1]] = [[c0, c1, 0], [d0, d1, 0]];
+        let from_us = self.ready.now_us();
         self.spi
             .transfer_in_place(words.as_flattened_mut())
             .map_err(AdcError::Bus)?;
+        let to_us = self.ready.now_us();
+        self.frame_us = to_us.wrapping_sub(from_us);
         if let Some(level) = silent(words.as_flattened()) {
             return Err(AdcError::Silent { level });
         }
@@ -184,6 +233,8 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         let mut frame = Frame {
             response: u16::from_be_bytes([r0, r1]),
             codes: [0; INPUTS],
+            from_us,
+            to_us,
         };
         for (code, [high, middle, low]) in frame.codes.iter_mut().zip(codes) {
             *code = i32::from_be_bytes([high, middle, low, 0]) >> 8;
@@ -202,12 +253,12 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         }
     }
 
-    fn try_start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+    fn try_start(&mut self) -> Result<(), AdcError<SPI::Error>> {
         self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         // This frame answers an earlier command, so neither its content nor its check matters.
         match self.exchange(RESET, 0) {
             Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
-            Ok(_) | Err(_) => delay.delay_us(RESET_US),
+            Ok(_) | Err(_) => self.wait_us(RESET_US),
         }
         // Each frame answers the previous command.
         let (read, write) = (|r: u8| READ | address(r), |r: u8| WRITE | address(r));
@@ -220,13 +271,85 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         let found = self.exchange(read(MODE_REGISTER), 0)?.response;
         compare(CLOCK, found, self.wanted(CLOCK))?;
         let found = self.exchange(NULL, 0)?.response;
-        compare(MODE_REGISTER, found, MODE_WANTED)
+        compare(MODE_REGISTER, found, MODE_WANTED)?;
+        self.measure_period()
     }
 
-    /// Whether the responses of a tick, `None` if it was none, report a resynchronisation.
-    fn count_unsynced(&mut self, responses: [Option<u16>; 3]) -> Result<(), AdcError<SPI::Error>> {
-        let synced = responses.into_iter().flatten().any(|r| r & F_RESYNC != 0);
-        self.unsynced_ticks = if synced {
+    /// The time from edge to edge by the controller's clock.
+    fn measure_period(&mut self) -> Result<(), AdcError<SPI::Error>> {
+        self.wait_us(FIRST_EDGE_US);
+        let first_us = self.ready.fell_us().ok_or(AdcError::UnknownInstant)?;
+        let from_us = self.ready.now_us();
+        let (mut last_us, mut shortest_us) = (first_us, u32::MAX);
+        for _ in 0..LOOKS_MAX {
+            if let Some(us) = self.ready.fell_us() {
+                shortest_us = shortest_us.min(us.wrapping_sub(last_us));
+                last_us = us;
+            }
+            if self.ready.now_us().wrapping_sub(from_us) > MEASURE_US {
+                break;
+            }
+        }
+        let span_ns = last_us.wrapping_sub(first_us).min(1_000_000) * 1000;
+        let count = (span_ns + PERIOD_NS / 2) / PERIOD_NS;
+        let period_ns = span_ns.checked_div(count).unwrap_or(0);
+        // Of a period that is a multiple, the shortest is longer.
+        let is_single = shortest_us < PERIOD_NS / 1000 * 3 / 2;
+        if count > COUNT_MAX || !is_single || !PERIODS_NS.contains(&period_ns) {
+            return Err(AdcError::UnknownInstant);
+        }
+        self.period_ns = period_ns;
+        Ok(())
+    }
+
+    /// Waits, one us less at most.
+    fn wait_us(&mut self, us: u32) {
+        let from_us = self.ready.now_us();
+        (0..LOOKS_MAX).find(|_| self.ready.now_us().wrapping_sub(from_us) >= us);
+    }
+
+    /// The ends of the conversions by the last edge, which was not disturbed by a frame. At least two have ended since the
+    /// trigger, so that the store is full.
+    fn conversions(&mut self) -> Option<Conversions> {
+        let mut edge_us = self.ready.fell_us()?;
+        let fills_us = self.period_ns / 2000 * 5;
+        if edge_us.wrapping_sub(self.triggered_us) <= fills_us {
+            // By a clock that is fast the third edge comes later.
+            self.wait_us(SLOW_EDGE_US);
+            edge_us = self.ready.fell_us()?;
+        }
+        let is_full = edge_us.wrapping_sub(self.triggered_us) > fills_us;
+        is_full.then(|| Conversions::after(edge_us, self.period_ns))
+    }
+
+    /// A frame, while no conversion ends that a full store would lose.
+    fn next_frame(
+        &mut self,
+        command: u16,
+        conversions: &mut Option<Conversions>,
+    ) -> Result<Frame, AdcError<SPI::Error>> {
+        let now_us = self.ready.now_us();
+        let wait = conversions
+            .as_mut()
+            .and_then(|c| c.wait_until_us(now_us, self.frame_us));
+        if let Some(until_us) = wait {
+            self.wait_us(until_us.wrapping_sub(now_us));
+        }
+        self.exchange(command, 0)
+    }
+
+    /// When the codes of a conversion were sampled, us, if they are settled.
+    fn instant_us(&self, conversions: &Conversions, number: u32) -> Option<u32> {
+        let end_us = conversions.end_us(number);
+        let since_us = end_us.wrapping_sub(self.triggered_us);
+        let is_settled = since_us > self.period_ns / 2000 * 7;
+        let late_us = (self.period_ns / 2 * 3 + EDGE_LATE_NS) / 1000;
+        is_settled.then(|| end_us.wrapping_sub(late_us))
+    }
+
+    /// Whether the part reported a resynchronisation in this tick.
+    fn count_unsynced(&mut self, is_synced: bool) -> Result<(), AdcError<SPI::Error>> {
+        self.unsynced_ticks = if is_synced {
             0
         } else {
             self.unsynced_ticks.saturating_add(1)
@@ -243,6 +366,13 @@ const fn address(register: u8) -> u16 {
     (register as u16) << 7
 }
 
+/// The conversion that a frame carries, if it is known.
+fn follow(conversions: &mut Option<Conversions>, frame: &Frame, is_ready: bool) -> Option<u32> {
+    conversions
+        .as_mut()?
+        .read(frame.from_us, frame.to_us, is_ready)
+}
+
 fn check_status<B>(found: u16) -> Result<(), AdcError<B>> {
     if found & STATUS_MASK == STATUS_WANTED {
         return Ok(());
@@ -254,41 +384,43 @@ fn check_status<B>(found: u16) -> Result<(), AdcError<B>> {
     })
 }
 
-impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
+impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
+    for Ads131m08<SPI, SYNC, READY>
+{
     type Bus = SPI::Error;
 
     const SPI_MODE: Mode = MODE_1;
     const SPI_HZ_MAX: u32 = 25_000_000;
-    /// 4 us after a conversion may end, and early enough for a frame before the next one does.
+    /// 4 us after the third conversion, whether it ends 192 or 203 us after the trigger.
     const SETTLE_US: u32 = 207;
-    /// The middle of the 192 us before 256 or 267 us, when the conversion ends that is read: 160 or
-    /// 171 us.
-    const SAMPLE_US: u32 = 166;
     const CODE_BITS: u32 = 24;
 
-    fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+    fn start(&mut self) -> Result<(), AdcError<SPI::Error>> {
         // What was set raises the flag of changed registers: the next STATUS is not looked at.
         self.status_is_next = false;
         self.temperatures = Held::MISSING;
         self.turn = MODE_REGISTER;
-        let result = self.try_start(delay);
+        let result = self.try_start();
         self.start_failed = result.is_err();
         result
     }
 
-    fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+    fn trigger(&mut self) -> Result<(), AdcError<SPI::Error>> {
         if self.unsynced_ticks > 0 {
-            delay.delay_us(SHIFT_US);
+            self.wait_us(SHIFT_US);
         }
         self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()))?;
+        self.triggered_us = self.ready.now_us();
+        // Earlier edges do not count.
+        let _ = self.ready.fell_us();
         if core::mem::take(&mut self.start_failed) {
             return Ok(());
         }
-        delay.delay_us(SYNC_US);
+        self.wait_us(SYNC_US);
         self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))
     }
 
-    fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
+    fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
         let (register, read) = (self.turn, self.channels.read);
         self.turn = if register < LAST_REGISTER {
             register + 1
@@ -296,35 +428,46 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
             MODE_REGISTER
         };
         let status_is_first = core::mem::take(&mut self.status_is_next);
-        let is_ready = |frame: &Frame| frame.response as u8 & read == read;
+        let mut conversions = self.conversions();
 
-        let first = self.exchange(READ | address(register), 0)?.response;
-        let found = self.exchange(NULL, 0)?.response;
-        let mut frame = self.exchange(NULL, 0)?;
-        // A status reports each event once: the status of a frame without codes counts, too.
-        let third = frame.response;
-        if !is_ready(&frame) {
-            frame = self.exchange(NULL, 0)?;
+        // Both carry conversions of the full store.
+        let first = self.next_frame(READ | address(register), &mut conversions)?;
+        follow(&mut conversions, &first, true);
+        let second = self.next_frame(NULL, &mut conversions)?;
+        follow(&mut conversions, &second, true);
+        // A status reports each event once: every one of them counts.
+        let mut statuses = 0;
+        let mut status = Ok(());
+        if status_is_first {
+            (statuses, status) = (first.response, check_status(first.response));
+        }
+        let (mut ready, mut found) = (0, None);
+        for _ in 2..FRAMES_MAX {
+            let frame = self.next_frame(NULL, &mut conversions)?;
+            statuses |= frame.response;
+            status = status.and(check_status(frame.response));
+            ready = frame.response as u8 & read;
+            let number = follow(&mut conversions, &frame, ready == read);
+            let instant = conversions.zip(number);
+            let instant = instant.and_then(|(c, number)| self.instant_us(&c, number));
+            found = instant.map(|us| (us, frame.codes));
+            let in_vain = ready == read && conversions.is_none_or(|c| c.are_lost());
+            if found.is_some() || in_vain {
+                break;
+            }
         }
         self.status_is_next = true;
 
-        let statuses = [
-            status_is_first.then_some(first),
-            Some(third),
-            Some(frame.response),
-        ];
-        for status in statuses.into_iter().flatten() {
-            check_status(status)?;
-        }
-        compare(register, found, self.wanted(register))?;
-        if !is_ready(&frame) {
-            let ready = frame.response as u8;
+        status?;
+        compare(register, second.response, self.wanted(register))?;
+        if ready != read {
             return Err(AdcError::NotReady { ready, read });
         }
-        self.count_unsynced(statuses)?;
-        let sampled = self.channels.frame(&frame.codes, sequence, time_us);
+        self.count_unsynced(statuses & F_RESYNC != 0)?;
+        let (time_us, codes) = found.ok_or(AdcError::UnknownInstant)?;
+        let sampled = self.channels.frame(&codes, sequence, time_us);
         let thermometers = &self.channels.thermometers;
-        let temperature_mc = (self.temperatures).at(thermometers, &frame.codes, time_us);
+        let temperature_mc = (self.temperatures).at(thermometers, &codes, time_us);
         Ok(sampled.with_temperature_mc(temperature_mc))
     }
 }

@@ -3,10 +3,9 @@
 
 extern crate std;
 
-use super::super::testing::{Frames, keeps_the_error_of_the_bus, on_part, transfer};
+use super::super::testing::{Frames, Line, keeps_the_error_of_the_bus, on_part, transfer};
 use super::*;
 use embedded_hal::spi::ErrorKind;
-use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::State::{self, High, Low};
 use std::vec;
 use std::vec::Vec;
@@ -50,16 +49,24 @@ type Sampled = Result<RawFrame, AdcError<ErrorKind>>;
 
 fn try_start(expected: &[Frames]) -> Result<(), AdcError<ErrorKind>> {
     let levels = [State::High];
-    on_part(Ads131m08::new, &expected.concat(), &levels, |adc| {
-        adc.start(&mut NoopDelay::new())
-    })
+    on_part(
+        Ads131m08::new,
+        Line::every(8),
+        &expected.concat(),
+        &levels,
+        |adc| adc.start(),
+    )
 }
 
 /// The samples of `count` ticks. Their frames must be `expected`.
 fn ticks(count: usize, expected: &[Frames]) -> Vec<Sampled> {
-    on_part(Ads131m08::new, &expected.concat(), &[], |adc| {
-        (0..count).map(|_| adc.sample(7, 14_000)).collect()
-    })
+    on_part(
+        Ads131m08::new,
+        Line::every(8),
+        &expected.concat(),
+        &[],
+        |adc| (0..count).map(|_| adc.sample(7)).collect(),
+    )
 }
 
 /// The frames of a tick that reads `register` back: the STATUS, the register, the STATUS again.
@@ -172,16 +179,20 @@ fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
 }
 
 #[test]
-fn a_conversion_that_is_not_there_yet_gets_one_more_frame() {
+fn a_conversion_that_is_not_there_yet_gets_more_frames() {
     let (late, new) = (answer(0x011f, QUIET), answer(0x013f, [5; 8]));
-    let and_then = |back| {
+    let and_then = |back: &[&Vec<u8>]| {
         let first = tick(0, 0x02, 0x2110, late.clone());
-        ticks(1, &[first, frame(0, 0, back)])[0]
+        let more = back
+            .iter()
+            .map(|back| frame(0, 0, back.to_vec()))
+            .collect::<Vec<_>>();
+        ticks(1, &[first, more.concat()])[0]
     };
-    assert_eq!(and_then(new).map(|frame| frame.hall), Ok([5; 3]));
+    assert_eq!(and_then(&[&new]).map(|frame| frame.hall), Ok([5; 3]));
     let (ready, read) = (0x1f, 0x3f);
     assert_eq!(
-        and_then(late.clone()),
+        and_then(&[&late, &late, &late]),
         Err(AdcError::NotReady { ready, read })
     );
 }
@@ -228,13 +239,12 @@ fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
     all.extend(frame(0xa000, 0, answer(0x0011, QUIET)));
     all.extend(started().concat());
     let levels = [High, Low, Low, High, High, Low, High];
-    on_part(Ads131m08::new, &all, &levels, |adc| {
-        let mut delay = NoopDelay::new();
-        assert!(adc.start(&mut delay).is_err());
-        assert_eq!(adc.trigger(&mut delay), Ok(()));
-        assert_eq!(adc.trigger(&mut delay), Ok(()));
-        assert_eq!(adc.start(&mut delay), Ok(()));
-        assert_eq!(adc.trigger(&mut delay), Ok(()));
+    on_part(Ads131m08::new, Line::every(8), &all, &levels, |adc| {
+        assert!(adc.start().is_err());
+        assert_eq!(adc.trigger(), Ok(()));
+        assert_eq!(adc.trigger(), Ok(()));
+        assert_eq!(adc.start(), Ok(()));
+        assert_eq!(adc.trigger(), Ok(()));
     });
 }
 

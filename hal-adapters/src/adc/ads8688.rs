@@ -34,7 +34,9 @@
 //! next tick starts the sequence again.) This driver reads no thermometers.
 //!
 //! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
-//! sample to sample it takes one frame, about 6 us; the part needs 2 us.
+//! sample to sample it takes one frame, about 6 us; the part needs 2 us. The time of a sample is the middle of the frames
+//! of the Hall codes. If they take more than 20 us together, the sample is refused
+//! ([`AdcError::UnknownInstant`]): by an interruption, inputs that are not neighbours, or SPI below 7.5 MHz.
 //!
 //! **Skew.** Channels are sampled one frame apart, about 6 us. Put the three Hall probes on
 //! neighbouring inputs: A and C are then 12 us apart, which at the fastest motion of a service
@@ -48,8 +50,7 @@
 //! a rail.
 
 use super::channels::INPUTS;
-use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
-use embedded_hal::delay::DelayNs;
+use super::{AdcError, Channels, Clock, FrameSampler, check_id, compare, silent};
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
@@ -77,14 +78,18 @@ const RANGE_10_24_V: u16 = 0;
 /// 15 ms for the reference with 22 uF, and 9 ms of margin.
 pub const REFERENCE_US: u32 = 24_000;
 
+/// From before the first Hall code until after the last one, at most, us: all are within 10 us of its middle.
+const SPAN_US: u32 = 20;
+
 /// Straight binary to signed.
 const ZERO_VOLT: i32 = 0x8000;
 
 /// The part on its bus, with its pin RST/PD.
 #[derive(Debug)]
-pub struct Ads8688<SPI, RST> {
+pub struct Ads8688<SPI, RST, CLOCK> {
     spi: SPI,
     reset: RST,
+    clock: CLOCK,
     channels: Channels,
     /// Register that the next tick reads back.
     turn: u8,
@@ -101,12 +106,13 @@ enum Reference {
     Settled,
 }
 
-impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
+impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> Ads8688<SPI, RST, CLOCK> {
     /// A part that is not started yet; `reset` drives RST/PD, which is held high.
-    pub const fn new(spi: SPI, reset: RST, channels: Channels) -> Self {
+    pub const fn new(spi: SPI, reset: RST, clock: CLOCK, channels: Channels) -> Self {
         Self {
             spi,
             reset,
+            clock,
             channels,
             turn: AUTO_SEQ_EN,
             reference: Reference::Started,
@@ -182,7 +188,7 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
     }
 }
 
-impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
+impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> FrameSampler for Ads8688<SPI, RST, CLOCK> {
     type Bus = SPI::Error;
 
     const SPI_MODE: Mode = MODE_1;
@@ -191,12 +197,9 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     /// The part converts while it is read.
     const SETTLE_US: u32 = 0;
 
-    /// The second of three neighbouring Hall probes: two frames after the trigger.
-    const SAMPLE_US: u32 = 12;
-
     const CODE_BITS: u32 = 16;
 
-    fn start(&mut self, _delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+    fn start(&mut self) -> Result<(), AdcError<SPI::Error>> {
         self.reference = Reference::Started;
         self.turn = AUTO_SEQ_EN;
         self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
@@ -213,18 +216,26 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         Ok(())
     }
 
-    fn trigger(&mut self, _delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+    fn trigger(&mut self) -> Result<(), AdcError<SPI::Error>> {
         Ok(())
     }
 
-    fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
+    fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
         self.exchange(AUTO_RST)?;
         let mut codes = [0; INPUTS];
         let read = self.channels.mask();
         let slots = (0u8..).zip(codes.iter_mut());
+        let (mut from_us, mut to_us) = (None, 0);
         for (input, code) in slots.filter(|(input, _)| read & 1 << input != 0) {
+            let now_us = self.clock.now_us();
             *code = self.code(input)?;
+            if self.channels.hall.contains(&input) {
+                from_us.get_or_insert(now_us);
+                to_us = self.clock.now_us();
+            }
         }
+        let span_us = to_us.wrapping_sub(from_us.unwrap_or_default());
+        let time_us = to_us.wrapping_sub(span_us / 2);
         let register = self.turn;
         self.turn = match register {
             LAST_REGISTER.. => AUTO_SEQ_EN,
@@ -234,6 +245,9 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         self.check(register)?;
         if !self.settled(time_us) {
             return Err(AdcError::NotReady { ready: 0, read });
+        }
+        if span_us > SPAN_US {
+            return Err(AdcError::UnknownInstant);
         }
         Ok(self.channels.frame(&codes, sequence, time_us))
     }

@@ -2,18 +2,20 @@
 
 extern crate std;
 
-use super::super::testing::{self, Frames, keeps_the_error_of_the_bus, transfer};
+use super::super::testing::{self, Frames, Line, keeps_the_error_of_the_bus, transfer};
 use super::*;
 use embedded_hal::spi::ErrorKind;
-use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as PinMock, State};
 use embedded_hal_mock::eh1::spi::Mock;
 use std::vec;
 use std::vec::Vec;
 
 /// Runs `work` on a settled part. Its bus must carry exactly `expected`.
-fn on_part<T>(expected: &Frames, work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock>) -> T) -> T {
-    testing::on_part(Ads8688::new, expected, &[], |adc| {
+fn on_part<T>(
+    expected: &Frames,
+    work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock, Line>) -> T,
+) -> T {
+    testing::on_part(Ads8688::new, Line::every(4), expected, &[], |adc| {
         adc.reference = Reference::Settled;
         work(adc)
     })
@@ -62,13 +64,17 @@ fn sampled(codes: [[u8; 2]; 6]) -> Frames {
 const ZERO: [[u8; 2]; 6] = [[0x80, 0]; 6];
 
 fn try_start(expected: Frames) -> Result<(), AdcError<ErrorKind>> {
-    testing::on_part(Ads8688::new, &expected, &[State::High], |adc| {
-        adc.start(&mut NoopDelay::new())
-    })
+    testing::on_part(
+        Ads8688::new,
+        Line::every(4),
+        &expected,
+        &[State::High],
+        |adc| adc.start(),
+    )
 }
 
 fn try_sample(expected: Frames) -> Result<RawFrame, AdcError<ErrorKind>> {
-    on_part(&expected, |adc| adc.sample(7, 14_000))
+    on_part(&expected, |adc| adc.sample(7))
 }
 
 /// Codes, and the register that is read back after them.
@@ -86,14 +92,14 @@ fn every_register_is_read_back_in_turn() {
         let mut all: Vec<_> = good.flat_map(|(r, v)| tick(*r, *v)).collect();
         all.extend(tick(register, value ^ 1));
         on_part(&all, |adc| {
-            assert!((0..11 + wrong).all(|_| adc.sample(0, 0).is_ok()));
+            assert!((0..11 + wrong).all(|_| adc.sample(0).is_ok()));
             let (found, wanted) = (u16::from(value ^ 1), u16::from(value));
             let error = AdcError::WrongSetting {
                 register,
                 found,
                 wanted,
             };
-            assert_eq!(adc.sample(0, 0), Err(error));
+            assert_eq!(adc.sample(0), Err(error));
         });
     }
 }

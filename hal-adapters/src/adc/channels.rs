@@ -9,7 +9,7 @@ pub(super) const INPUTS: usize = 8;
 /// The inputs of the six sensors, and of thermometers where there are any: 0 to 7, all different.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Channels {
-    hall: [u8; 3],
+    pub(super) hall: [u8; 3],
     capacitive: [u8; 3],
     pub(super) thermometers: [Option<&'static Thermometer>; 2],
     /// The inputs that are read, thermometers included: bit k for input k.

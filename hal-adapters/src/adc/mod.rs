@@ -12,15 +12,15 @@
 //! second costs 58 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
 //! a tenth of the Hall noise, and the only check in its frames is a signature of six bits.
 //!
-//! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, and the
-//! part's control pin. It allocates nothing, cannot panic, and its waits are fixed and short:
-//! 10 us for a reset in [`FrameSampler::start`], 1 us for a pulse in [`FrameSampler::trigger`].
+//! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, the part's control pin, and a
+//! [`Clock`]: it stamps each sample itself, and refuses a sample that it cannot stamp to 10 us. It allocates nothing,
+//! cannot panic, and its waits are short: 0.5 ms in [`FrameSampler::start`], 4 us in [`FrameSampler::trigger`].
 //! The published driver for the ADS131M08 drives chip select and data-ready pins itself, waits 100 ms at start and
 //! returns the previous codes in place of damaged codes. There is no published driver for the ADS8688.
 //!
 //! ```
-//! use embedded_hal_mock::eh1::{delay::NoopDelay, digital, spi};
-//! use hal_adapters::adc::{Ads8688, Channels, FrameSampler};
+//! use embedded_hal_mock::eh1::{digital, spi};
+//! use hal_adapters::adc::{Ads8688, Channels, Clock, FrameSampler};
 //!
 //! // Mocks in place of a HAL's SPI device and pin: a frame that starts the sequence, then one
 //! // for each of the six inputs, all with code 0x8001 and the input's signature, then a register.
@@ -39,12 +39,21 @@
 //! let expected = [tick(0x01, 0x3f), tick(0x02, 0xc0)].concat();
 //! let (mut bus, mut pin) = (spi::Mock::new(&expected), digital::Mock::new(&[]));
 //!
-//! let mut converter = Ads8688::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-//! // Once: converter.start(&mut delay)?; then in every tick:
-//! converter.trigger(&mut NoopDelay::new())?;
+//! // In place of a timer.
+//! let us = core::cell::Cell::new(0);
+//! struct Timer<'t>(&'t core::cell::Cell<u32>);
+//! impl Clock for Timer<'_> {
+//!     fn now_us(&mut self) -> u32 {
+//!         self.0.get()
+//!     }
+//! }
+//! let mut converter = Ads8688::new(bus.clone(), pin.clone(), Timer(&us), Channels::IN_ORDER);
+//! // Once: converter.start()?; then in every tick:
+//! converter.trigger()?;
 //! // This part's reference needs 24 ms: until then there are no codes.
-//! assert!(converter.sample(0, 0).is_err());
-//! let frame = converter.sample(12, 24_000)?;
+//! assert!(converter.sample(0).is_err());
+//! us.set(24_000);
+//! let frame = converter.sample(12)?;
 //! assert_eq!((frame.hall, frame.capacitive, frame.sequence), ([1; 3], [1; 3], 12));
 //! # bus.done();
 //! # pin.done();
@@ -61,7 +70,6 @@ pub use ads131m08::Ads131m08;
 pub use ads8688::Ads8688;
 pub use channels::Channels;
 
-use embedded_hal::delay::DelayNs;
 use embedded_hal::digital;
 use embedded_hal::spi::Mode;
 use runtime::RawFrame;
@@ -73,7 +81,7 @@ use runtime::RawFrame;
 /// or after another [`start`](Self::start).
 ///
 /// The constants are all that a board needs to know of the part. Drivers are made by
-/// `new(spi, pin, channels)`, `pin` being the part's one control pin, so that a board can name
+/// `new(spi, pin, clock, channels)`, `pin` being the part's one control pin, so that a board can name
 /// the part by a type alone.
 pub trait FrameSampler {
     /// The bus's own error.
@@ -88,9 +96,6 @@ pub trait FrameSampler {
     /// From the trigger until the codes can be read, us.
     const SETTLE_US: u32;
 
-    /// From the trigger to the middle of what is sampled, us.
-    const SAMPLE_US: u32;
-
     /// Bits of a code: 16 or 24.
     const CODE_BITS: u32;
 
@@ -98,22 +103,33 @@ pub trait FrameSampler {
     ///
     /// # Errors
     /// See [`AdcError`]; the part may then be in any state, and this may be called again.
-    fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
+    fn start(&mut self) -> Result<(), AdcError<Self::Bus>>;
 
     /// Starts the conversion of one period, on parts that can be triggered.
     ///
     /// # Errors
     /// [`AdcError::Pin`].
-    fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
+    fn trigger(&mut self) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
-    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US). Its temperatures were read in the last 100 ms, by a
-    /// driver that reads thermometers.
+    /// Reads the codes of one period. `sequence` goes into the frame unchanged; the frame's time is the middle of what was
+    /// sampled, by the driver's clock. Its temperatures were read in the last 100 ms, by a driver that reads thermometers.
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors
     /// See [`AdcError`]; the period then has no codes at all.
-    fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<Self::Bus>>;
+    fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<Self::Bus>>;
+}
+
+/// A clock that never stops.
+pub trait Clock {
+    /// Now, us, wrapping.
+    fn now_us(&mut self) -> u32;
+}
+
+/// The data-ready line of a converter: a timer notes its edges by itself, so that no interrupt delays them.
+pub trait DataReady: Clock {
+    /// When the line fell last, us of the clock; `None` if it did not since the last call.
+    fn fell_us(&mut self) -> Option<u32>;
 }
 
 /// Why a converter gave no codes.
@@ -184,6 +200,10 @@ pub enum AdcError<B> {
     /// The trigger does not reach the part: the time of its samples is unknown.
     #[error("the trigger does not reach the converter")]
     NoSync,
+    /// The instant of the sample is not known to 10 us: no edge of the data-ready line, a converter's clock that is far
+    /// off, or frames that are too slow or were interrupted.
+    #[error("the instant of the sample is not known to 10 us")]
+    UnknownInstant,
 }
 
 impl<B> AdcError<B> {
@@ -200,6 +220,7 @@ impl<B> AdcError<B> {
             Self::NotReady { .. } => 7,
             Self::WrongInput { .. } => 8,
             Self::NoSync => 10,
+            Self::UnknownInstant => 11,
             Self::Stuck { channel, .. } => 0x20 + *channel,
         }
     }
@@ -236,9 +257,8 @@ fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> 
 mod testing {
     extern crate std;
 
-    use super::{AdcError, Channels, FrameSampler};
+    use super::{AdcError, Channels, Clock, DataReady, FrameSampler};
     use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-    use embedded_hal_mock::eh1::delay::NoopDelay;
     use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
     use embedded_hal_mock::eh1::spi::{Mock, Transaction};
     use std::vec::Vec;
@@ -258,26 +278,62 @@ mod testing {
 
     /// Runs `work` on a part. Its bus must carry exactly `expected`, its pin exactly `levels`.
     pub(super) fn on_part<S, T>(
-        new: fn(Mock<u8>, PinMock, Channels) -> S,
+        new: fn(Mock<u8>, PinMock, Line, Channels) -> S,
+        line: Line,
         expected: &Frames,
         levels: &[State],
         work: impl FnOnce(&mut S) -> T,
     ) -> T {
         let levels: Vec<_> = levels.iter().copied().map(PinTransaction::set).collect();
         let (mut bus, mut pin) = (Mock::new(expected), PinMock::new(&levels));
-        let result = work(&mut new(bus.clone(), pin.clone(), Channels::IN_ORDER));
+        let result = work(&mut new(bus.clone(), pin.clone(), line, Channels::IN_ORDER));
         bus.done();
         pin.done();
         result
     }
 
     pub(super) fn keeps_the_error_of_the_bus<S: FrameSampler<Bus = ErrorKind>>(
-        new: fn(Broken, NoPin, Channels) -> S,
+        new: fn(Broken, NoPin, Line, Channels) -> S,
     ) {
-        let mut part = new(Broken, NoPin, Channels::IN_ORDER);
+        let mut part = new(Broken, NoPin, Line::every(8), Channels::IN_ORDER);
         let error = AdcError::Bus(ErrorKind::ModeFault);
-        assert_eq!(part.start(&mut NoopDelay::new()), Err(error));
-        assert_eq!(part.sample(0, 0), Err(error));
+        assert_eq!(part.start(), Err(error));
+        assert_eq!(part.sample(0), Err(error));
+    }
+
+    /// A clock that shows some us more at each look, and a data-ready line that has just fallen at each look, 64 us
+    /// after the look before.
+    #[derive(Debug)]
+    pub(super) struct Line {
+        now_us: u32,
+        fell_us: u32,
+        step_us: u32,
+    }
+
+    impl Line {
+        /// The first sample of either part is at 14,000 us.
+        pub(super) const fn every(step_us: u32) -> Self {
+            Self {
+                now_us: 13_986,
+                fell_us: 13_973,
+                step_us,
+            }
+        }
+    }
+
+    impl Clock for Line {
+        fn now_us(&mut self) -> u32 {
+            self.now_us += self.step_us;
+            self.now_us
+        }
+    }
+
+    impl DataReady for Line {
+        fn fell_us(&mut self) -> Option<u32> {
+            self.fell_us += 64;
+            self.now_us = self.fell_us;
+            Some(self.fell_us)
+        }
     }
 
     /// An unconnected pin.

@@ -172,11 +172,11 @@ mod tests {
 
     use super::*;
     use crate::adc::Ads131m08;
-    use crate::adc::testing::{Broken, NoPin};
+    use crate::adc::testing::{Broken, Line, NoPin};
 
     const SUPPLY_V: f64 = 3.3;
     const SERIES_OHM: f64 = 68e3;
-    const INPUT: AnalogInput = <Ads131m08<Broken, NoPin>>::INPUT;
+    const INPUT: AnalogInput = <Ads131m08<Broken, NoPin, Line>>::INPUT;
     static NTC: [i32; ntc_103at::POINTS] = ntc_103at::codes(&INPUT, SUPPLY_V, SERIES_OHM);
     static LINEAR: [i32; 2] = tmp235::codes(&INPUT);
 

@@ -1,13 +1,12 @@
 //! A converter: read in every tick, and started again after faults.
 
 use crate::schedule::PERIOD_US;
-use embedded_hal::delay::DelayNs;
 use hal_adapters::adc::stuck::StuckWatch;
 use hal_adapters::adc::{AdcError, FrameSampler};
 use runtime::RawFrame;
 
 /// Ticks in a row without codes after which the converter is started again: 32 ms. A start
-/// takes up to 210 bytes of SPI, about 0.2 ms.
+/// takes up to 210 bytes of SPI and the measurement of a period, about 0.7 ms.
 pub const RESTART_TICKS: u16 = (32_000 / PERIOD_US) as u16;
 
 /// A converter and its recent faults.
@@ -39,15 +38,15 @@ impl<A: FrameSampler> Acquisition<A> {
     ///
     /// # Errors
     /// See [`AdcError`]. Ticks go on, and the converter is started again after [`RESTART_TICKS`].
-    pub fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<A::Bus>> {
+    pub fn start(&mut self) -> Result<(), AdcError<A::Bus>> {
         self.starts = self.starts.saturating_add(1);
         self.faults_in_a_row = 0;
-        self.converter.start(delay)
+        self.converter.start()
     }
 
     /// Starts the conversion of a tick. The sample of this tick reports a fault.
-    pub fn trigger(&mut self, delay: &mut impl DelayNs) {
-        self.trigger_fault = self.converter.trigger(delay).err();
+    pub fn trigger(&mut self) {
+        self.trigger_fault = self.converter.trigger().err();
     }
 
     /// The codes of a tick.
@@ -56,13 +55,8 @@ impl<A: FrameSampler> Acquisition<A> {
     /// See [`AdcError`]. After [`RESTART_TICKS`] such ticks in a row, or one with a setting that
     /// was lost, the converter is started again instead of being read, and can give codes from the
     /// next tick on.
-    pub fn sample(
-        &mut self,
-        sequence: u32,
-        time_us: u32,
-        delay: &mut impl DelayNs,
-    ) -> Result<RawFrame, AdcError<A::Bus>> {
-        let result = self.try_sample(sequence, time_us, delay);
+    pub fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<A::Bus>> {
+        let result = self.try_sample(sequence);
         if result.is_ok() {
             self.faults_in_a_row = 0;
         } else {
@@ -82,21 +76,16 @@ impl<A: FrameSampler> Acquisition<A> {
         self.starts
     }
 
-    fn try_sample(
-        &mut self,
-        sequence: u32,
-        time_us: u32,
-        delay: &mut impl DelayNs,
-    ) -> Result<RawFrame, AdcError<A::Bus>> {
+    fn try_sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<A::Bus>> {
         if let Some(fault) = self.trigger_fault.take() {
             return Err(fault);
         }
         if self.faults_in_a_row >= RESTART_TICKS {
-            self.start(delay)?;
+            self.start()?;
             let (ready, read) = (0, 0);
             return Err(AdcError::NotReady { ready, read });
         }
-        let sampled = self.converter.sample(sequence, time_us);
+        let sampled = self.converter.sample(sequence);
         // The next samples would be wrong, and a part can report it only once.
         if let Err(AdcError::WrongSetting { .. }) = sampled {
             self.faults_in_a_row = RESTART_TICKS;

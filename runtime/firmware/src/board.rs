@@ -3,6 +3,7 @@
 //! feature in `Cargo.toml`. The pins are in the README beside this crate.
 
 use crate::spi::SpiDma;
+use crate::timer::ReadyLine;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::thermometer::{Thermometer, ntc_103at, tmp235};
 use hal_adapters::adc::{Channels, FrameSampler};
@@ -17,7 +18,7 @@ use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::time::Hertz;
 
 /// The converter: any part with a driver that implements [`FrameSampler`].
-pub type Converter = hal_adapters::adc::Ads131m08<SpiDevice, ControlPin>;
+pub type Converter = hal_adapters::adc::Ads131m08<SpiDevice, ControlPin, ReadyLine>;
 
 /// The inputs of the sensors.
 const CHANNELS: Channels = match Channels::IN_ORDER.with_thermometers(THERMOMETERS) {
@@ -190,6 +191,7 @@ pub fn set_up(
     (gpioa, gpiob, gpioc): (GPIOA, GPIOB, GPIOC),
     (spi1, dma2): (SPI1, DMA2),
     can1: CAN1,
+    ready: ReadyLine,
     rcc: &mut Rcc,
 ) -> Parts {
     let (gpioa, gpiob, gpioc) = (gpioa.split(rcc), gpiob.split(rcc), gpioc.split(rcc));
@@ -204,6 +206,11 @@ pub fn set_up(
     select.set_speed(Speed::VeryHigh);
     let mut control = control.into_push_pull_output_in_state(PinState::High);
     control.set_speed(Speed::High);
+    // DRDY, at TIM2_CH3.
+    gpioa
+        .pa2
+        .into_alternate::<1>()
+        .set_internal_resistor(Pull::Up);
     // The output of an unselected converter is open.
     let pins = (
         Some(gpioa.pa5.into_alternate().speed(Speed::VeryHigh)),
@@ -226,7 +233,7 @@ pub fn set_up(
     CAN1::enable(rcc);
     CAN1::reset(rcc);
     Parts {
-        converter: Converter::new(spi, control, CHANNELS),
+        converter: Converter::new(spi, control, ready, CHANNELS),
         can: can1,
         led: gpioc.pc1.into_push_pull_output(),
         servo: gpiob.pb1.into_pull_up_input(),

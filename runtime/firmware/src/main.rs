@@ -27,23 +27,11 @@ mod timer;
 mod wait;
 mod watchdog;
 
-use embedded_hal::delay::DelayNs;
-
-/// Short waits by counting cycles of the core.
-pub struct Cycles;
-
-impl DelayNs for Cycles {
-    fn delay_ns(&mut self, ns: u32) {
-        const CYCLES_PER_US: u32 = board::CORE_HZ / 1_000_000;
-        cortex_m::asm::delay((ns / 1000 + 1) * CYCLES_PER_US);
-    }
-}
-
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use super::start;
     use super::timer::{SETTLED, TICK};
-    use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
+    use super::{board, board::Converter, bus::Bus, fault, flash, timer::Clock};
     use super::{random::Random, supply::Supply, wait::Stopwatch, watchdog::Watchdog};
     use core::mem::MaybeUninit;
     use cortex_m::peripheral::SCB;
@@ -115,7 +103,10 @@ mod app {
         fault::begin(Step::Peripherals);
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let serial = (device.SPI1, device.DMA2);
-        let parts = board::set_up(ports, serial, device.CAN1, &mut rcc);
+        TIM2::enable(&mut rcc);
+        let mut clock = Clock::new(device.TIM2);
+        let ready = clock.data_ready();
+        let parts = board::set_up(ports, serial, device.CAN1, ready, &mut rcc);
         let bus = Bus::new(parts.can, board::STAGE_NODE, crystal, &mut stopwatch);
         let random = Random::new(device.RNG, &mut rcc);
 
@@ -152,15 +143,13 @@ mod app {
         fault::begin(Step::Converter);
         let mut acquisition = Acquisition::new(parts.converter);
         // The ticks report a failure and start it again.
-        let _ = acquisition.start(&mut Cycles);
+        let _ = acquisition.start();
 
         let checks = parts.not_pulled_up
             | bit(board_check::INTERNAL_OSCILLATOR, !crystal)
             | bit(board_check::CAN_NOT_STARTED, !bus.takes_part())
             | bit(board_check::ZERO_LOST, zero_lost);
         let board = start::board_facts(&before, options, checks);
-        TIM2::enable(&mut rcc);
-        let mut clock = Clock::new(device.TIM2);
         let schedule = Schedule::starting(clock.now_us());
         clock.set_alarm::<TICK>(schedule.due_us());
         watchdog.feed();
@@ -230,7 +219,7 @@ mod app {
         if alarms.tick {
             let started_us = local.clock.now_us();
             let tick = local.schedule.start_tick(started_us);
-            local.acquisition.trigger(&mut Cycles);
+            local.acquisition.trigger();
             local.clock.set_alarm::<TICK>(local.schedule.due_us());
             // A tick that is still open is abandoned: it never feeds the watchdog.
             if local.open.replace(tick).is_some() {
@@ -249,10 +238,7 @@ mod app {
             return;
         };
 
-        let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
-        let sample = local
-            .acquisition
-            .sample(tick.sequence, sampled_us, &mut Cycles);
+        let sample = local.acquisition.sample(tick.sequence);
         bus.start_tick();
         // Its announcement has left, or nobody listens.
         let is_silent = bus.is_idle() || *local.silence_waits > SILENCE_TICKS_MAX;

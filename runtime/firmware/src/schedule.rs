@@ -19,7 +19,7 @@ const _: () = assert!(
 pub const TICKS_PER_S: u32 = 1_000_000 / PERIOD_US;
 
 /// A tick that starts later than this was sampled at the wrong time, us. An interrupt of this
-/// program takes 0.15 ms, and 0.3 ms when it starts the converter again.
+/// program takes 0.15 ms, and 0.7 ms when it starts the converter again.
 pub const LATE_US: u32 = 200;
 
 /// One tick.

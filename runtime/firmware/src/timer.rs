@@ -1,8 +1,10 @@
 //! TIM2 as a clock in us that never stops, with two alarms. Its 32 bits wrap after 71
-//! minutes, like the time of a frame.
+//! minutes, like the time of a frame. Its third channel notes when the converter's data-ready line falls.
 
 use crate::board;
+use hal_adapters::adc::DataReady;
 use stm32f4xx_hal::pac::TIM2;
+use stm32f4xx_hal::pac::tim2::RegisterBlock;
 
 /// The alarm of ticks.
 pub const TICK: u8 = 0;
@@ -32,8 +34,16 @@ impl Clock {
         timer.arr().write(|w| w.arr().set(u32::MAX));
         timer.egr().write(|w| w.ug().set_bit());
         timer.sr().write(|w| w.uif().clear_bit());
+        // Channel 3 captures the falling edges of its own input (RM0090 rev. 18, section 18.3.5).
+        timer.ccmr2_input().write(|w| w.cc3s().ti3());
+        (timer.ccer()).write(|w| w.cc3p().set_bit().cc3e().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
         Self { timer }
+    }
+
+    /// The line at channel 3.
+    pub fn data_ready(&self) -> ReadyLine {
+        ReadyLine { seen_us: 0 }
     }
 
     /// Now, us.
@@ -67,5 +77,31 @@ impl Clock {
             self.timer.dier().modify(|_, w| w.cc2ie().clear_bit());
         }
         Alarms { tick, settled }
+    }
+}
+
+/// The data-ready line of the converter, at channel 3 of the running clock.
+pub struct ReadyLine {
+    seen_us: u32,
+}
+
+impl ReadyLine {
+    /// The timer, which [`Clock`] has started.
+    const fn timer() -> &'static RegisterBlock {
+        // SAFETY: two registers are read, and reading CCR3 changes a flag that nothing uses.
+        unsafe { &*TIM2::PTR }
+    }
+}
+
+impl hal_adapters::adc::Clock for ReadyLine {
+    fn now_us(&mut self) -> u32 {
+        Self::timer().cnt().read().cnt().bits()
+    }
+}
+
+impl DataReady for ReadyLine {
+    fn fell_us(&mut self) -> Option<u32> {
+        let fell_us = Self::timer().ccr(2).read().ccr().bits();
+        (core::mem::replace(&mut self.seen_us, fell_us) != fell_us).then_some(fell_us)
     }
 }

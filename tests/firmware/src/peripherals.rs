@@ -120,6 +120,10 @@ pub struct Peripherals {
     alarms: [Alarm; 2],
     timer_flags: u32,
     timer_started_ns: Option<u64>,
+    /// Whether no tick has come since the reset.
+    starts: bool,
+    /// What the timer read when DRDY fell, us.
+    captured_us: u32,
     dma: Dma,
     transfer: Option<Transfer>,
     selected: bool,
@@ -170,6 +174,8 @@ impl Peripherals {
             alarms: [Alarm::default(); 2],
             timer_flags: 0,
             timer_started_ns: None,
+            starts: true,
+            captured_us: 0,
             dma: Dma::default(),
             transfer: None,
             selected: false,
@@ -190,7 +196,8 @@ impl Peripherals {
         self.reset_flags |= flags;
         self.alarms = [Alarm::default(); 2];
         self.timer_flags = 0;
-        self.timer_started_ns = None;
+        (self.timer_started_ns, self.captured_us) = (None, 0);
+        self.starts = true;
         self.dma = Dma::default();
         self.transfer = None;
         let fed = self.watchdog.fed;
@@ -215,7 +222,12 @@ impl Peripherals {
     }
 
     fn timer_us(&self) -> u32 {
-        let since = self.timer_started_ns.map_or(0, |start| self.now_ns - start);
+        self.timer_us_at(self.now_ns)
+    }
+
+    /// What the timer reads at a time.
+    pub fn timer_us_at(&self, ns: u64) -> u32 {
+        let since = (self.timer_started_ns).map_or(0, |start| ns.saturating_sub(start));
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
@@ -236,8 +248,10 @@ impl Peripherals {
                 alarm.at_ns = None;
                 self.timer_flags |= 2 << k;
                 if k == 0 {
-                    let first_ns = *self.first_tick_ns.get_or_insert(at);
-                    self.adc.input.start(first_ns);
+                    self.first_tick_ns.get_or_insert(at);
+                    if std::mem::take(&mut self.starts) {
+                        self.adc.input.join(at);
+                    }
                 }
             }
         }

@@ -1,15 +1,14 @@
-//! TI ADS131M08 (SBAS950) with CLKIN 8 MHz: modulators at 4 MHz, sinc3 filters, a store of two
-//! conversions, frames of ten words of 24 bits. A [`Variant`] decides where the sheet is silent.
+//! TI ADS131M08 (SBAS950B) with CLKIN 8 MHz: modulators at 4 MHz, sinc3 filters, a store of two
+//! conversions, frames of ten words of 24 bits, DRDY. A [`Variant`] decides where the sheet is silent.
+//!
+//! DRDY (8.5.1.5, DRDY_FMT 0) falls when a conversion is ready, not while a frame is on the bus. When a frame has ended and
+//! another conversion is stored, it falls once more at once (figure 8-21).
 //!
 //! Not modelled: word lengths other than 24 bits, oversampling above 1024, phases, gains, offsets,
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
-mod variant;
-
-pub use variant::{Store, Variant};
-
-use super::filter::{Conversion, Filter, T_MOD_NS};
+use super::filter::{Conversion, T_MOD_NS, codes};
 use super::{Input, Row};
 use std::collections::VecDeque;
 
@@ -33,6 +32,40 @@ const REGMAP_CRC: usize = 0x3e;
 
 const REG_CRC_EN: u16 = 1 << 13;
 
+/// Behaviour where the sheet is silent; times in periods of the modulators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// From a resynchronisation until the filters take data: none by 8.5.2, 44 by equation 9, 300 by table 8-3.
+    pub wait: u64,
+    /// From the last sample of a conversion until it is ready: the 44 of equation 9 may lie here.
+    pub delay: u64,
+    /// A conversion is removed when its frame ends, not when it begins.
+    pub late_pop: bool,
+}
+
+impl Variant {
+    /// All plausible behaviours, the plainest first.
+    pub const ALL: [Self; 8] = {
+        let times = [(44, 0), (0, 0), (0, 44), (INITIAL_WAIT, 0)];
+        let mut all = [Self {
+            wait: 44,
+            delay: 0,
+            late_pop: false,
+        }; 8];
+        let mut k = 0;
+        while k < 8 {
+            let (wait, delay) = times[k / 2];
+            all[k] = Self {
+                wait,
+                delay,
+                late_pop: k % 2 == 1,
+            };
+            k += 1;
+        }
+        all
+    };
+}
+
 /// The part.
 pub struct Ads131m08 {
     /// The behaviour where the sheet is silent.
@@ -49,6 +82,9 @@ pub struct Ads131m08 {
     store: VecDeque<Conversion>,
     shown: Option<Conversion>,
     codes: Row,
+    /// When DRDY fell last, and whether a frame keeps it from falling.
+    fell_ns: Option<u64>,
+    is_selected: bool,
     resynchronised: bool,
     map_flag: bool,
     map_crc: u16,
@@ -58,13 +94,12 @@ pub struct Ads131m08 {
     listens: bool,
     received: Vec<u8>,
     reply: Vec<u8>,
-    filter: Filter,
 }
 
 impl Default for Ads131m08 {
     fn default() -> Self {
         let mut new = Self {
-            variant: Variant::PLAIN,
+            variant: Variant::ALL[0],
             registers: [0; 64],
             ready_ns: POWER_ON_NS,
             low_since_ns: None,
@@ -75,6 +110,8 @@ impl Default for Ads131m08 {
             store: VecDeque::new(),
             shown: None,
             codes: [0; 6],
+            fell_ns: None,
+            is_selected: false,
             resynchronised: false,
             map_flag: false,
             map_crc: 0,
@@ -83,7 +120,6 @@ impl Default for Ads131m08 {
             listens: false,
             received: Vec::new(),
             reply: Vec::new(),
-            filter: Filter::default(),
         };
         new.power_up(0);
         new
@@ -157,37 +193,44 @@ impl Ads131m08 {
         128 << (self.registers[CLOCK] >> 2 & 7).min(3)
     }
 
-    /// Time of the n-th conversion from now, ns.
+    /// When the filters of the next conversion have all samples, ns.
     fn next_end_ns(&self) -> u64 {
         self.from_ns + (self.conversions + 1) * self.osr() * T_MOD_NS
     }
 
+    /// When the next conversion is ready, ns.
+    fn next_ready_ns(&self) -> u64 {
+        self.next_end_ns() + self.variant.delay * T_MOD_NS
+    }
+
+    /// When DRDY fell last, ns.
+    pub fn fell_ns(&mut self, now_ns: u64) -> Option<u64> {
+        self.advance(now_ns);
+        self.fell_ns
+    }
+
     /// Stores the conversions until now.
     fn advance(&mut self, now_ns: u64) {
-        let ended = now_ns.saturating_sub(self.from_ns) / (self.osr() * T_MOD_NS);
+        let since_ns = now_ns.saturating_sub(self.from_ns + self.variant.delay * T_MOD_NS);
+        let ended = since_ns / (self.osr() * T_MOD_NS);
         if self.clocked && self.store.len() == 2 && self.conversions >= 3 {
-            // A full store keeps at most one of the last two conversions.
-            self.conversions = self.conversions.max(ended.saturating_sub(2));
+            // A full store keeps none of them.
+            self.conversions = self.conversions.max(ended.saturating_sub(1));
         }
-        while self.clocked && self.next_end_ns() <= now_ns {
+        while self.clocked && self.next_ready_ns() <= now_ns {
             let conversion = Conversion {
                 end_ns: self.next_end_ns(),
                 from_ns: self.from_ns,
                 fast: self.fast && self.conversions < 2,
                 osr: self.osr(),
             };
+            if !self.is_selected {
+                self.fell_ns = Some(self.next_ready_ns());
+            }
             self.conversions += 1;
-            if self.variant.gated && !conversion.fast && self.conversions < 3 && !self.fast {
-                continue;
+            if self.store.len() < 2 {
+                self.store.push_back(conversion);
             }
-            if self.store.len() == 2 {
-                match self.variant.store {
-                    Store::KeepsOldest => continue,
-                    Store::KeepsNewest => self.store.pop_front(),
-                    Store::ReplacesLast => self.store.pop_back(),
-                };
-            }
-            self.store.push_back(conversion);
         }
     }
 
@@ -198,8 +241,9 @@ impl Ads131m08 {
                 self.low_since_ns = Some(now_ns);
                 self.advance(now_ns);
                 let period_ns = self.osr() * T_MOD_NS;
-                let aligned = now_ns >= self.from_ns
-                    && (now_ns - self.from_ns) % period_ns < T_CLKIN_NS
+                let clock_ns = self.from_ns + self.variant.delay * T_MOD_NS;
+                let aligned = now_ns >= clock_ns
+                    && (now_ns - clock_ns) % period_ns < T_CLKIN_NS
                     && self.conversions > 0;
                 if self.clocked && !aligned {
                     self.restart(now_ns + self.variant.wait * T_MOD_NS, false);
@@ -268,6 +312,7 @@ impl Ads131m08 {
             return;
         }
         self.advance(now_ns);
+        self.is_selected = true;
         self.check_registers(now_ns);
         let status = self.status();
         let response = self.response.unwrap_or_else(|| {
@@ -276,7 +321,7 @@ impl Ads131m08 {
         });
         self.shown = self.store.front().copied();
         if let Some(conversion) = self.shown {
-            self.codes = self.filter.codes(conversion, input);
+            self.codes = codes(conversion, input);
             if !self.variant.late_pop {
                 self.store.pop_front();
             }
@@ -316,6 +361,10 @@ impl Ads131m08 {
             && self.store.front() == self.shown.as_ref()
         {
             self.store.pop_front();
+        }
+        self.is_selected = false;
+        if !self.store.is_empty() {
+            self.fell_ns = Some(now_ns);
         }
         let word = |k: usize| match self.received.get(k..k + 2) {
             Some(&[high, low]) => u16::from_be_bytes([high, low]),

@@ -53,7 +53,7 @@ fn the_first_conversion_ends_when_table_8_3_says() {
     for (osr, t_clkin) in table {
         let mut part = running(Variant {
             wait: INITIAL_WAIT,
-            ..Variant::PLAIN
+            ..Variant::ALL[0]
         });
         frame(&mut part, T_0 - 1000, 0x6180, 0xff02 | osr << 2);
         pulse(&mut part, T_0);
@@ -61,22 +61,39 @@ fn the_first_conversion_ends_when_table_8_3_says() {
     }
 }
 
+/// 8.3.7.1: unsettled data are not gated; 8.5.1.5: DRDY.
 #[test]
-fn after_a_resynchronisation_two_conversions_are_not_settled_and_not_held_back() {
-    for wait in [0, 44, INITIAL_WAIT] {
-        let mut part = running(Variant {
-            wait,
-            ..Variant::PLAIN
-        });
+fn after_a_resynchronisation_two_conversions_are_not_settled_and_drdy_falls_with_each() {
+    for variant in Variant::ALL {
+        let mut part = running(variant);
         pulse(&mut part, T_0);
         let codes = [1, 2, 3, 4].map(|n| {
-            let end = T_0 + (wait + 128 * n) * T_MOD_NS;
-            assert_eq!(frame(&mut part, end - 1, 0, 0).0 & 0xff, 0);
-            frame(&mut part, end, 0, 0).1[0]
+            let ready_ns = T_0 + (variant.wait + variant.delay + 128 * n) * T_MOD_NS;
+            assert_eq!(frame(&mut part, ready_ns - 1, 0, 0).0 & 0xff, 0);
+            assert!(part.fell_ns(ready_ns - 1) < Some(ready_ns));
+            assert_eq!(part.fell_ns(ready_ns), Some(ready_ns));
+            frame(&mut part, ready_ns, 0, 0).1[0]
         });
         // The thirds of a sinc3 filter weigh 1/6, 4/6 and 1/6.
         assert!((codes[0] - 10_000).abs() < 300, "{codes:?}");
         assert!((codes[1] - 50_000).abs() < 300, "{codes:?}");
         assert_eq!(codes[2..], [60_000; 2]);
+    }
+}
+
+/// 8.5.1.5 and figure 8-21.
+#[test]
+fn drdy_does_not_fall_during_a_frame_but_after_it_if_a_conversion_is_left() {
+    for variant in Variant::ALL {
+        let mut part = running(variant);
+        pulse(&mut part, T_0);
+        let first_ns = T_0 + (variant.wait + variant.delay + 128) * T_MOD_NS;
+        part.select(first_ns + 1, &input(), |_| [0; 8], false);
+        let second_ns = first_ns + 128 * T_MOD_NS;
+        assert_eq!(part.fell_ns(second_ns + 1), Some(first_ns));
+        part.deselect(second_ns + 2);
+        assert_eq!(part.fell_ns(second_ns + 3), Some(second_ns + 2));
+        frame(&mut part, second_ns + 4, 0, 0);
+        assert_eq!(part.fell_ns(second_ns + 5), Some(second_ns + 2));
     }
 }

@@ -2,6 +2,7 @@
 //! fast-settling one.
 
 use super::{Input, Row};
+use std::sync::OnceLock;
 
 /// Period of the modulators, ns.
 pub const T_MOD_NS: u64 = 250;
@@ -31,16 +32,7 @@ fn sinc3(osr: u64) -> Vec<f64> {
     convolve(&convolve(&vec![1.0 / n as f64; n]))
 }
 
-/// The filters of all channels.
-#[derive(Default)]
-pub struct Filter {
-    osr: u64,
-    /// Weights, and the sum of those before each of them, of sinc3 and of the fast-settling filter.
-    sinc3: Weights,
-    fast: Weights,
-}
-
-#[derive(Default)]
+/// Weights of a filter, the newest sample first, and the sum of those before each of them.
 struct Weights {
     of: Vec<f64>,
     sums: Vec<f64>,
@@ -56,42 +48,46 @@ impl Weights {
     }
 }
 
-impl Filter {
-    /// The codes of a conversion: the mean over the window of its filter, with zeros for samples
-    /// from before the filter took data.
-    pub fn codes(&mut self, conversion: Conversion, input: &Input) -> Row {
-        let Conversion {
-            end_ns,
-            from_ns,
-            fast,
-            osr,
-        } = conversion;
-        if self.osr != osr {
-            self.osr = osr;
-            self.sinc3 = Weights::new(sinc3(osr));
-            self.fast = Weights::new(vec![1.0 / osr as f64; osr as usize]);
-        }
-        let weights = if fast { &self.fast } else { &self.sinc3 };
-        let samples = weights
-            .of
-            .len()
-            .min(((end_ns - from_ns) / T_MOD_NS) as usize);
-        let first_ns = end_ns - samples as u64 * T_MOD_NS;
-        let sum = match input.constant(first_ns, end_ns - 1) {
-            Some(row) if samples == weights.of.len() => return row,
-            Some(row) => row.map(|code| f64::from(code) * weights.sums[samples]),
-            None => {
-                let mut sum = [0.0; 6];
-                for (k, weight) in (1u64..).zip(&weights.of[..samples]) {
-                    for (sum, code) in sum.iter_mut().zip(input.at(end_ns - k * T_MOD_NS)) {
-                        *sum += weight * code;
-                    }
+/// The weights of a filter, made once: by oversampling 128 to 1024, sinc3 and fast-settling.
+fn weights(fast: bool, osr: u64) -> &'static Weights {
+    static ALL: [[OnceLock<Weights>; 4]; 2] = [const { [const { OnceLock::new() }; 4] }; 2];
+    ALL[usize::from(fast)][(osr / 128).ilog2() as usize].get_or_init(|| {
+        Weights::new(match fast {
+            true => vec![1.0 / osr as f64; osr as usize],
+            false => sinc3(osr),
+        })
+    })
+}
+
+/// The codes of a conversion: the mean over the window of its filter, with zeros for samples
+/// from before the filter took data.
+pub fn codes(conversion: Conversion, input: &Input) -> Row {
+    let Conversion {
+        end_ns,
+        from_ns,
+        fast,
+        osr,
+    } = conversion;
+    let weights = weights(fast, osr);
+    let samples = weights
+        .of
+        .len()
+        .min(((end_ns - from_ns) / T_MOD_NS) as usize);
+    let first_ns = end_ns - samples as u64 * T_MOD_NS;
+    let sum = match input.constant(first_ns, end_ns - 1) {
+        Some(row) if samples == weights.of.len() => return row,
+        Some(row) => row.map(|code| f64::from(code) * weights.sums[samples]),
+        None => {
+            let mut sum = [0.0; 6];
+            for (k, weight) in (1u64..).zip(&weights.of[..samples]) {
+                for (sum, code) in sum.iter_mut().zip(input.at(end_ns - k * T_MOD_NS)) {
+                    *sum += weight * code;
                 }
-                sum
             }
-        };
-        sum.map(|code| (code.round() as i32).clamp(-0x80_0000, 0x7f_ffff))
-    }
+            sum
+        }
+    };
+    sum.map(|code| (code.round() as i32).clamp(-0x80_0000, 0x7f_ffff))
 }
 
 #[cfg(test)]
@@ -109,7 +105,7 @@ mod tests {
             fast: false,
             osr: 128,
         };
-        let late_ns = 1_000_000 - Filter::default().codes(conversion, &input)[0];
+        let late_ns = 1_000_000 - codes(conversion, &input)[0];
         // 382 samples of 250 ns, the newest one 250 ns old: 47.875 us.
         assert_eq!(late_ns, 47_875);
         // A whole period of the data rate is a notch.

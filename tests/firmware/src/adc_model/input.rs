@@ -48,9 +48,12 @@ impl Input {
         }
     }
 
-    /// The first tick has come.
-    pub fn start(&mut self, first_tick_ns: u64) {
-        self.start_ns.get_or_insert(first_tick_ns + self.after_ns);
+    /// The first tick has come since a start of the program. Held rows change with its ticks.
+    pub fn join(&mut self, tick_ns: u64) {
+        let start_ns = *self.start_ns.get_or_insert(tick_ns + self.after_ns);
+        if !self.moves {
+            self.start_ns = Some(start_ns + tick_ns.saturating_sub(start_ns) % self.period_ns);
+        }
     }
 
     /// The row that was there without a change from `from_ns` to `to_ns`.

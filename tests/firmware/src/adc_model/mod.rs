@@ -30,6 +30,8 @@ pub enum AdcFault {
     Rail(usize),
     /// The wire to SYNC/RESET is cut; a resistor keeps the pin high.
     Control,
+    /// The wire of DRDY is cut.
+    Ready,
     /// The wire of chip select is cut.
     Select,
     /// CLKIN stands still.
@@ -67,6 +69,13 @@ impl Adc {
         self.part.set_clock(self.fault != AdcFault::Clock, now_ns);
         self.part
             .sync(high || self.fault == AdcFault::Control, now_ns);
+    }
+
+    /// When DRDY fell last, ns, if its wire is whole.
+    pub fn ready_fell_ns(&mut self, now_ns: u64) -> Option<u64> {
+        self.part.set_clock(self.fault != AdcFault::Clock, now_ns);
+        let fell_ns = self.part.fell_ns(now_ns);
+        fell_ns.filter(|_| self.fault != AdcFault::Ready)
     }
 
     /// Chip select falls.

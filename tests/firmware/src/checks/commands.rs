@@ -9,7 +9,7 @@ use hal_adapters::can::status::flag;
 use hal_adapters::can::{Layout, Message as M};
 
 /// From the trigger to the middle of the sample, by the driver's documentation, us.
-const SAMPLE_US: u64 = 166;
+const SAMPLE_US: u64 = 165;
 
 /// Identify: the flag and a fast LED, for the time asked for.
 pub fn identify(bench: &Bench) {

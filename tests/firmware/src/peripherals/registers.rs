@@ -25,7 +25,7 @@ const DMA2_BIT: u32 = 1 << 22;
 /// Bits of SPI_CR1 and SPI_CR2 (RM0090 28.5.1 and 28.5.2): on; requests to receive and to send.
 const SPI_ON: u32 = 1 << 6;
 const SPI_REQUESTS: u32 = 0b11;
-/// A look at the flags of DMA2: four cycles, ns.
+/// A look at the flags of DMA2 or at the timer: four cycles, ns.
 const LOOK_NS: u64 = 24;
 /// Time of 21 instructions of two cycles, ns.
 const OF_21_INSTRUCTIONS_NS: u64 = 250;
@@ -196,7 +196,11 @@ impl Peripherals {
                 self.advance();
                 self.timer_flags
             }
-            o if o == TIM2 + 0x24 => self.timer_us(),
+            o if o == TIM2 + 0x24 => {
+                self.now_ns += LOOK_NS;
+                self.timer_us()
+            }
+            o if o == TIM2 + 0x3c => self.capture(),
             o if (DMA2..DMA2 + 0x400).contains(&o) => {
                 if o == DMA2 {
                     self.end_transfer();
@@ -290,6 +294,21 @@ impl Peripherals {
         let late_ns = k as i64 * self.settled_jitter_ns;
         let at_ns = (left > 0).then_some((start + us * US).saturating_add_signed(late_ns));
         self.alarms[k] = Alarm { at_ns };
+    }
+
+    /// Channel 3 of TIM2 (RM0090 rev. 18, sections 18.3.5, 18.4.8, 18.4.9): it captures the timer when its input falls, if the
+    /// input is its own, on, and connected to PA2 by alternate function 1 (DS8626, table 9).
+    fn capture(&mut self) -> u32 {
+        let word = |offset: usize| self.words[offset / 4];
+        let is_on = word(TIM2 + 0x1c) & 0b11 == 0b01 && word(TIM2 + 0x20) >> 8 & 0b1011 == 0b0011;
+        let is_connected = word(GPIOA) >> 4 & 0b11 == 0b10 && word(GPIOA + 0x20) >> 8 & 0xf == 1;
+        let fell_ns = self.adc.ready_fell_ns(self.now_ns);
+        if let Some(ns) = fell_ns.filter(|_| is_on && is_connected)
+            && self.timer_started_ns.is_some_and(|start| ns >= start)
+        {
+            self.captured_us = self.timer_us_at(ns);
+        }
+        self.captured_us
     }
 
     /// The bit of an input, by its resistors on the board and inside.

@@ -126,7 +126,12 @@ pub fn cases() -> Vec<Case> {
             within: 2,
             ..Case::new("SYNC cut", AdcFault::Control, &[fault(10), fault(5)])
         },
-        Case::new("CLKIN stops", AdcFault::Clock, &[NOT_READY, fault(5)]),
+        Case::new(
+            "CLKIN stops",
+            AdcFault::Clock,
+            &[NOT_READY, fault(5), fault(11)],
+        ),
+        Case::new("DRDY cut", AdcFault::Ready, &[fault(11), fault(5), SILENT]),
         Case::lost_setting("a short loss of power", Event::PowerLoss),
         Case::frozen("all codes frozen", AdcFault::Stuck, 0),
     ];
