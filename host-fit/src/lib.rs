@@ -11,7 +11,8 @@
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
 //! | [`diff`] | what changed between two blobs |
-//! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, made into a log |
+//! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, updated |
+//! | [`join`](mod@join) | records of the sensors and of the reference with their clocks, made into a log |
 //! | [`cli`] | the commands |
 #![forbid(unsafe_code)]
 
@@ -24,5 +25,6 @@ pub mod bus;
 pub mod calibrate;
 pub mod cli;
 pub mod diff;
+pub mod join;
 pub mod output;
 pub mod report;

@@ -102,13 +102,16 @@ impl ReadOptions {
         watch: Watch::NONE,
     };
 
+    /// For a record of the sensors: a reference is not needed.
+    pub const SENSORS: Self = Self {
+        reference: ReferenceUse::IfPresent,
+        ..Self::FIT
+    };
+
     /// For `decode`: saturated rows are kept, a reference is not needed.
     pub const DECODE: Self = Self {
-        bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Keep,
-        reference: ReferenceUse::IfPresent,
-        rows_max: FIT_ROWS_MAX,
-        watch: Watch::NONE,
+        ..Self::SENSORS
     };
 }
 

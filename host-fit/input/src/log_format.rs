@@ -1,8 +1,8 @@
 //! A calibration log as text, in the columns and units that the stage names.
 
+use crate::dataset::LoggedFrame;
 use crate::log::layout::Quantity;
 use crate::stage::Stage;
-use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 use std::fmt::Write;
 
@@ -11,20 +11,26 @@ use std::fmt::Write;
 pub struct LogFormat {
     header: String,
     us_per_unit: f64,
-    /// Codes per unit of the columns of gaps and Hall sensors.
-    codes_per_unit: [[f64; 3]; 2],
+    /// Codes, or m and rad, per unit of the columns of the gaps or the vertical pose; codes per unit of the Hall columns.
+    vertical_per_unit: [f64; 3],
+    hall_per_unit: [f64; 3],
     /// m degC per unit of the columns of mount and body, and at zero; `None` where there is none.
     temperature_mc: [Option<[f64; 2]>; 2],
 }
 
 impl LogFormat {
-    /// With a reference of these three quantities; `with_temperature`, with the columns of temperatures
-    /// that the stage names.
-    pub fn new(reference: [Quantity; 3], with_temperature: bool, stage: &Stage) -> Self {
+    /// With a reference of these three quantities and the vertical motion in these three, codes or a pose;
+    /// `with_temperature`, with the columns of temperatures that the stage names.
+    pub fn new(
+        reference: [Quantity; 3],
+        vertical: [Quantity; 3],
+        with_temperature: bool,
+        stage: &Stage,
+    ) -> Self {
         let quantities = [Quantity::Movement, Quantity::Time]
             .into_iter()
             .chain(reference)
-            .chain(Quantity::GAPS)
+            .chain(vertical)
             .chain(Quantity::HALL);
         let mut header = csv::WriterBuilder::new()
             .comment(Some(b'#'))
@@ -39,7 +45,8 @@ impl LogFormat {
         Self {
             header: String::from_utf8(header).unwrap_or_default(),
             us_per_unit: scale(Quantity::Time),
-            codes_per_unit: [Quantity::GAPS, Quantity::HALL].map(|set| set.map(scale)),
+            vertical_per_unit: vertical.map(scale),
+            hall_per_unit: Quantity::HALL.map(scale),
             temperature_mc: temperatures.map(|column| column.map(|_| stage.temperature.scale_mc)),
         }
     }
@@ -56,15 +63,18 @@ impl LogFormat {
         text: &mut String,
         (movement, t_us): (i64, i64),
         [x, y, z]: [f64; 3],
-        codes: &RawFrame,
+        frame: &LoggedFrame,
     ) {
         let time = t_us as f64 / self.us_per_unit;
-        let [gaps_per_unit, hall_per_unit] = self.codes_per_unit;
-        let in_units = |codes: [i32; 3], per_unit: [f64; 3]| {
-            [0, 1, 2].map(|k| f64::from(codes[k]) / per_unit[k])
+        let in_units =
+            |values: [f64; 3], per_unit: [f64; 3]| [0, 1, 2].map(|k| values[k] / per_unit[k]);
+        let codes = &frame.codes;
+        let vertical = match &frame.vertical {
+            Some(pose) => pose.to_array().map(f64::from),
+            None => codes.capacitive.map(f64::from),
         };
-        let [g1, g2, g3] = in_units(codes.capacitive, gaps_per_unit);
-        let [a, b, c] = in_units(codes.hall, hall_per_unit);
+        let [g1, g2, g3] = in_units(vertical, self.vertical_per_unit);
+        let [a, b, c] = in_units(codes.hall.map(f64::from), self.hall_per_unit);
         let _ = write!(
             text,
             "{movement},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}"

@@ -47,11 +47,11 @@ const BINARY: [(&[u8], &str); 19] = [
     ),
     (
         b"MDF ",
-        "a measurement of ASAM MDF (.mf4); a record of the CAN bus becomes one that host-fit import reads by `python -m can.logconvert record.mf4 record.log`, another one CSV in Python with asammdf",
+        "a measurement of ASAM MDF (.mf4); a record of the CAN bus becomes one that host-fit join reads by `python -m can.logconvert record.mf4 record.log`, another one CSV in Python with asammdf",
     ),
     (
         b"LOGG",
-        "a record of the CAN bus by Vector (.blf); `python -m can.logconvert record.blf record.log` makes one that host-fit import reads",
+        "a record of the CAN bus by Vector (.blf); `python -m can.logconvert record.blf record.log` makes one that host-fit join reads",
     ),
     (b"%PDF", "a PDF; name the CSV log itself"),
     (b"\x28\xb5\x2f\xfd", "zstd data; decompress it first"),
@@ -66,19 +66,19 @@ const BINARY: [(&[u8], &str); 19] = [
 const TEXT: [(&[u8], &str); 6] = [
     (
         b"(",
-        "a record of the CAN bus by candump; host-fit import joins it with the reference to a log",
+        "a record of the CAN bus by candump; host-fit join joins it with the reference to a log",
     ),
     (
         b"date ",
-        "a record of the CAN bus by Vector (.asc); `python -m can.logconvert record.asc record.log` makes one that host-fit import reads",
+        "a record of the CAN bus by Vector (.asc); `python -m can.logconvert record.asc record.log` makes one that host-fit join reads",
     ),
     (
         b";$FILEVERSION",
-        "a record of the CAN bus by PEAK (.trc); `python -m can.logconvert record.trc record.log` makes one that host-fit import reads",
+        "a record of the CAN bus by PEAK (.trc); `python -m can.logconvert record.trc record.log` makes one that host-fit join reads",
     ),
     (
         b"Time Stamp,ID,",
-        "a record of the CAN bus by SavvyCAN (GVRET); save it as candump log for host-fit import",
+        "a record of the CAN bus by SavvyCAN (GVRET); save it as candump log for host-fit join",
     ),
     (b"{", "JSON; write its numbers as CSV"),
     (b"<", "XML or HTML; write its numbers as CSV"),

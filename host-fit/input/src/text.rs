@@ -19,6 +19,9 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Compressed bytes that are read at once.
 const BUFFER_BYTES: usize = 64 * 1024;
 
+/// Bytes of a text that show its format.
+const OPENING_BYTES: usize = 64;
+
 /// A text that is read piece by piece.
 pub struct TextReader<'a> {
     path: PathBuf,
@@ -34,6 +37,8 @@ pub struct TextReader<'a> {
     /// The first bytes, which were read to recognise the encoding: its mark, and the text after it.
     mark: Vec<u8>,
     start: Vec<u8>,
+    /// The first bytes of the text.
+    opening: Vec<u8>,
     hash: Option<Sha256>,
 }
 
@@ -99,6 +104,7 @@ impl<'a> TextReader<'a> {
             utf16: None,
             mark: Vec::new(),
             start: Vec::new(),
+            opening: Vec::new(),
             hash: None,
         };
         let mut start = text.piece(other_format::PROBE_BYTES)?;
@@ -112,6 +118,8 @@ impl<'a> TextReader<'a> {
         text.mark = start;
         text.utf16 = utf16.map(|(decoder, _)| decoder);
         let decoded = decoded(&mut text.utf16.clone(), &text.start, false)?;
+        let opening = decoded.trim_ascii_start();
+        text.opening = opening.get(..OPENING_BYTES).unwrap_or(opening).to_vec();
         match other_format::in_binary(&decoded) {
             None => Ok(text),
             Some((offset, looks_like)) => Err(SourceProblem::Binary { offset, looks_like }),
@@ -159,6 +167,11 @@ impl<'a> TextReader<'a> {
     /// The name of the file in messages.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The first bytes of the text, by which its format is known, without white space before them.
+    pub fn opening(&self) -> &[u8] {
+        &self.opening
     }
 
     /// Number of bytes of the file that were read, and their total; 0 where it is not known.

@@ -16,14 +16,14 @@ pub const TRUTH_HEADER: &str = "movement,t_us,x_nm,y_nm,rz_nrad,z_nm,rx_nrad,ry_
 pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
     let first = recording.movements.iter().flatten().next();
     let in_climate = first.is_some_and(|sample| sample.temperature_mc != [MISSING_CODE; 2]);
-    let format = LogFormat::new(Quantity::BEAMS, in_climate, stage);
+    let format = LogFormat::new(Quantity::BEAMS, Quantity::GAPS, in_climate, stage);
     let mut text = format.header();
     text.reserve(64 * recording.rows());
     let per_nm = Quantity::BEAMS.map(|beam| 1e-9 / stage.log.column(beam).scale);
     for (movement, samples) in (0..).zip(&recording.movements) {
         for s in samples {
             let beams = [0, 1, 2].map(|i| s.beams_nm[i] as f64 * per_nm[i]);
-            format.append(&mut text, (movement, s.t_us), beams, &s.codes(0));
+            format.append(&mut text, (movement, s.t_us), beams, &s.codes(0).into());
         }
     }
     text

@@ -19,7 +19,7 @@ use std::time::Duration;
 pub(crate) struct RecordSettings {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     pub(crate) can: BusAddress,
-    /// Where to write the record, as `candump -L` does, for `import`: a new file.
+    /// Where to write the record, as `candump -L` does, for `join`: a new file.
     pub(crate) out: PathBuf,
     /// End after this many seconds; without it, on Ctrl-C.
     pub(crate) seconds: Option<Duration>,

@@ -13,9 +13,9 @@
 
 use super::fit_options::Mismatch;
 use super::interrupt;
-use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::calibrate::CalibrateError;
+use crate::join::JoinError;
 use crate::output::export::ExportError;
 use crate::output::{OutputError, OutputProblem};
 use hallstage_calibration::fit::FitError;
@@ -160,7 +160,7 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
 /// Whether Ctrl-C ended the work.
 fn is_interrupted(error: &(dyn Error + 'static)) -> bool {
     let import_error = match error.downcast_ref() {
-        Some(ImportError::Log(error)) => Some(error),
+        Some(JoinError::Log(error)) => Some(error),
         _ => None,
     };
     let log: Option<&LogError> = error.downcast_ref().or(import_error);

@@ -12,10 +12,10 @@ mod export;
 mod fit;
 mod fit_options;
 mod identify;
-mod import;
 mod init;
 mod inspect;
 mod interrupt;
+mod join;
 pub(crate) mod key;
 mod live;
 mod plan;
@@ -103,8 +103,9 @@ commands! {
     Eval(eval::EvalArgs) => eval::run,
     /// Bring a parameter blob up to date by a few seconds of log.
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
-    /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(import::ImportArgs) => import::run,
+    /// Join the records of the sensors and of the interferometers, each with its own clock, into a log.
+    #[command(visible_alias = "import")]
+    Join(join::JoinArgs) => join::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.

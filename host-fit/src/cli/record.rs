@@ -17,7 +17,7 @@ pub(super) struct RecordArgs {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(value_name = "IFACE")]
     can: BusAddress,
-    /// Where to write the record, as `candump -L` does, for `import`: a new file.
+    /// Where to write the record, as `candump -L` does, for `join`: a new file.
     #[arg(long, value_name = "BUS.log")]
     out: PathBuf,
     #[command(flatten)]

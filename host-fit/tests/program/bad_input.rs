@@ -161,8 +161,8 @@ fn wrong_usage_ends_with_status_2() {
         "fit log.csv --out p.bin --seed -1",
         "fit log.csv --out p.bin --threads 0",
         "decode p.bin --out pose.csv",
-        "import bus.log log.csv --out x.csv --search-s=nan",
-        "import bus.log log.csv --out x.csv --search-s=3601",
+        "join bus.log log.csv --out x.csv --search-s=nan",
+        "join bus.log log.csv --out x.csv --search-s=3601",
     ] {
         assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments}");
     }

@@ -82,8 +82,8 @@ impl Folder {
     ///
     /// # Panics
     /// It is not.
-    pub fn import(&self, options: &[&str]) {
-        let files = "import @bus @reference --stage @stage.toml --out @joined.csv";
+    pub fn join(&self, options: &[&str]) {
+        let files = "join @bus @reference --stage @stage.toml --out @joined.csv";
         let command: Vec<&str> = files.split(' ').chain(options.iter().copied()).collect();
         if self.run(&command, "joined.csv") {
             std::fs::rename(self.path("joined.csv"), self.path("log")).expect("the same folder");

@@ -156,7 +156,7 @@ pub enum LogProblem {
     PoseWithPlaces,
     /// Two columns for one quantity.
     #[error(
-        "it repeats the quantity of column {first}; name the one to read in the [log] table of stage.toml, and put the other into `ignore`"
+        "it repeats the quantity of column {first}; name one of the two columns in the [log] table of stage.toml, and put the other into `ignore`"
     )]
     RepeatedColumn {
         /// The other column, from 1.

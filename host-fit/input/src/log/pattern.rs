@@ -1,4 +1,4 @@
-//! A fault that many rows share is named by its pattern, for no single row is to blame.
+//! Faults of many rows: no single row is to blame, and the message names the pattern.
 
 use super::cell::CellFault;
 use super::error::{LogError, LogProblem};
@@ -7,7 +7,7 @@ use std::mem::discriminant;
 
 /// Most rows that are read on after the first fault.
 const ROWS_MAX: usize = 100_000;
-/// Fewest rows with the same fault, and their smallest share, 1 in so many, that make a pattern.
+/// Fewest rows with the same fault, and one over their smallest share, that make a pattern.
 const ROWS_MIN: usize = 10;
 const ONE_IN: usize = 20;
 /// Bits of the counters of clocks.

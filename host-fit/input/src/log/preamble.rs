@@ -1,7 +1,7 @@
 //! What stands above the rows of a table: notes, the header, facts and units of the columns.
 //!
 //! The rows are the longest run of lines with mostly numbers. Their cells say what separates cells, and how many
-//! there are. The header is the last line above the rows whose cells are distinct names.
+//! there are. The header is the last line of distinct names above the rows.
 
 use super::cell::shown;
 use super::error::{LogError, LogProblem, Place};
@@ -62,8 +62,8 @@ impl Preamble {
     /// Of a table that begins with these bytes.
     ///
     /// The header is the first line with at least three known names; without one, the line of known names in the
-    /// last comment above the rows, as NumPy writes it; without one, the last line above the rows whose cells are
-    /// distinct names; without rows, the first line.
+    /// last comment above the rows, as NumPy writes it; without one, the last line of distinct names above the
+    /// rows; without rows, the first line.
     ///
     /// # Errors
     /// `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, and `OtherFormat` of a source.
@@ -171,7 +171,7 @@ impl Line {
         numbers >= 2 && 2 * numbers > self.names.len()
     }
 
-    /// Whether it has distinct words, for at least half of so many cells.
+    /// Whether it has distinct words, for at least half of the usual cells.
     fn has_names(&self, cells: usize) -> bool {
         let mut names: Vec<&String> = self.names.iter().filter(|name| !name.is_empty()).collect();
         let count = names.len();

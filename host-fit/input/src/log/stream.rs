@@ -67,14 +67,17 @@ impl<'a> LogRows<'a> {
     }
 
     /// As [`Self::open`], of a text that is open.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn new(
         text: TextReader<'a>,
         what: &'static str,
         stage: &'a Stage,
         options: &ReadOptions,
     ) -> Result<Self, LogError> {
-        let mut table = Table::open(text, |name| stage.log.knows(name))?;
-        table.lines = table.lines.watched(options.watch, what);
+        let table = Table::open(text, |name| stage.log.knows(name))?;
+        let mut table = table.watched(options.watch, what);
         let columns = header::columns(&table.head, stage, options.reference)?;
         let servo_us = stage.servo_period_s * 1e6;
         let period_us = table.period_us(columns.time, columns.movement)?;

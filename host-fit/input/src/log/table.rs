@@ -14,6 +14,7 @@ use super::time::{Clock, is_time};
 use super::units;
 use crate::statistics::median;
 use crate::text::TextReader;
+use crate::watch::Watch;
 use std::path::PathBuf;
 
 /// Most columns of a table. A table with more is damaged or hostile.
@@ -132,6 +133,13 @@ impl<'a> Table<'a> {
             separator,
             open_line: None,
         })
+    }
+
+    /// The same, watched while it is read; `work` is being done with it.
+    #[must_use]
+    pub fn watched(mut self, watch: Watch<'static>, work: &'static str) -> Self {
+        self.lines = self.lines.watched(watch, work);
+        self
     }
 
     /// The median time between the rows that follow in one movement, us, by the next mebibyte of the

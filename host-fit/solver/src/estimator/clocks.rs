@@ -36,6 +36,8 @@ pub struct Lag {
     pub value_s: f64,
     /// What it grows by, s/s.
     pub rate: f64,
+    /// Standard error of the rate, s/s.
+    pub rate_standard_error: f64,
     /// Its standard errors at the first and the last of the rows, s.
     pub standard_errors_s: [f64; 2],
     /// The square of the residuals over what the noise makes of them, at least 1.
@@ -94,6 +96,7 @@ impl<'s> Alignment<'s> {
         Some(Lag {
             value_s: step[LAG] * LAG_S,
             rate: step[LAG_RATE] * RATE,
+            rate_standard_error: covariance[(LAG_RATE, LAG_RATE)].max(0.0).sqrt(),
             standard_errors_s: [at(first.time_s), at(last.time_s)],
             excess,
         })

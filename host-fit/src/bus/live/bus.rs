@@ -21,7 +21,7 @@ mod none {
     /// The errors of SocketCAN that callers handle, and the absence of SocketCAN.
     #[derive(Debug, thiserror::Error)]
     #[error(
-        "a CAN bus needs SocketCAN, which only Linux has; on this system use a log of the bus with `import`"
+        "a CAN bus needs SocketCAN, which only Linux has; on this system use a log of the bus with `join`"
     )]
     pub enum BusError {
         /// There is no SocketCAN.

@@ -1,6 +1,6 @@
 //! The contents of a record so far.
 
-use crate::bus::import::bus_log::{BusCounts, Collector};
+use crate::bus::bus_log::{BusCounts, Collector};
 use hal_adapters::can::command::{Content, Mailbox};
 use hal_adapters::can::status::{NodeState, NodeStatus};
 use hal_adapters::can::{Layout, StampedFrame};

@@ -1,4 +1,4 @@
-//! A record of the bus beside a sound log of the reference: what `import` writes, `decode` takes.
+//! A record of the bus beside a sound log of the reference: what `join` writes, `decode` takes.
 
 #![no_main]
 
@@ -17,6 +17,6 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
 
 fuzz_target!(|record: &[u8]| {
     FOLDER.write("bus", record);
-    FOLDER.import(&[]);
-    FOLDER.import(&["--skip-bad-lines"]);
+    FOLDER.join(&[]);
+    FOLDER.join(&["--skip-bad-lines"]);
 });

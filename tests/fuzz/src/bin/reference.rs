@@ -1,4 +1,4 @@
-//! A log of the interferometers beside a sound record of the bus: what `import` writes, `decode`
+//! A log of the interferometers beside a sound record of the bus: what `join` writes, `decode`
 //! takes.
 
 #![no_main]
@@ -18,6 +18,6 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
 
 fuzz_target!(|reference: &[u8]| {
     FOLDER.write("reference", reference);
-    FOLDER.import(&[]);
-    FOLDER.import(&["--search-s", "1"]);
+    FOLDER.join(&[]);
+    FOLDER.join(&["--search-s", "1"]);
 });

@@ -1,4 +1,4 @@
-//! Faults that many rows share.
+//! Faults of many rows.
 
 use super::*;
 

@@ -91,7 +91,7 @@ fn tables_that_are_no_log() {
         (&without("hall_c_cnt"), ":1: the column `hall_c_cnt` is missing", "`hall_c = "),
         (rows, ":1: the first line holds numbers", ""),
         ("{\"rows\": 3}\n", ":1: no table", "JSON"),
-        ("(1780000000.000005) can0 15A#6C00\n", ":1: no table", "host-fit import"),
+        ("(1780000000.000005) can0 15A#6C00\n", ":1: no table", "host-fit join"),
         ("hello\n1\n2\n", ":1: \"hello\"", "separate the cells"),
         (&spaces, ":1: ", "separate the cells"),
         ("", ": the log is empty", ""),

@@ -1,10 +1,10 @@
-//! Joins ticks and reference by time: the reference at the time of a tick lies on the straight line between the
-//! samples before and after it.
+//! Joins ticks and reference by time: the reference at the time of a tick lies on the cubic through the two samples
+//! before and the two after it; on a straight line at a gap.
 
-use super::ImportError;
+use super::JoinError;
 use super::node_clock::Tick;
 use super::reference::Sample;
-use runtime::RawFrame;
+use hallstage_input::dataset::LoggedFrame;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,8 +15,8 @@ pub struct JoinedRow {
     pub movement: i64,
     /// Reference, in the units of its columns.
     pub values: [f64; 3],
-    /// All codes.
-    pub codes: RawFrame,
+    /// What the sensors read.
+    pub frame: LoggedFrame,
 }
 
 /// The counts of a join.
@@ -24,8 +24,8 @@ pub struct JoinedRow {
 pub struct JoinCounts {
     /// Ticks.
     pub ticks: usize,
-    /// First and last tick, us on the clock of the reference.
-    pub bus_us: [f64; 2],
+    /// First and last row of the sensors, us on the clock of the reference.
+    pub sensors_us: [f64; 2],
     /// First and last sample of the reference, us.
     pub reference_us: [f64; 2],
     /// Duration of all movements of the reference, s.
@@ -49,11 +49,11 @@ impl JoinCounts {
     ///
     /// # Errors
     /// `Unpaired`.
-    pub(super) fn check(self) -> Result<(), ImportError> {
+    pub(super) fn check(self) -> Result<(), JoinError> {
         if 2 * self.rows >= self.ticks && 2.0 * self.covered_s >= self.reference_s {
             return Ok(());
         }
-        Err(ImportError::Unpaired(self))
+        Err(JoinError::Unpaired(self))
     }
 }
 
@@ -88,17 +88,41 @@ pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> ReferenceA
     if since > tolerance_us || until > tolerance_us {
         return ReferenceAt::TooFar;
     }
-    let part = if until > 0.0 {
-        since / (since + until)
-    } else {
-        0.0
+    let values = match next
+        .checked_sub(2)
+        .and_then(|first| samples.get(first..next + 2))
+    {
+        Some(four) if follow(four, tolerance_us) => on_polynomial(four, t_us),
+        _ if until > 0.0 => on_polynomial(&[*before, *after], t_us),
+        _ => after.values,
     };
-    let between = |k: usize| before.values[k] + part * (after.values[k] - before.values[k]);
     ReferenceAt::Found {
         movement: before.movement,
-        values: [0, 1, 2].map(between),
+        values,
         nearest_us: since.min(until),
     }
+}
+
+/// Whether samples of one movement follow each other within the tolerance.
+fn follow(samples: &[Sample], tolerance_us: f64) -> bool {
+    samples.windows(2).all(|pair| {
+        pair[0].movement == pair[1].movement && pair[1].t_us - pair[0].t_us <= tolerance_us
+    })
+}
+
+/// The values at a time on the polynomial through samples (Lagrange).
+fn on_polynomial(samples: &[Sample], t_us: f64) -> [f64; 3] {
+    let mut values = [0.0; 3];
+    for one in samples {
+        let others = samples.iter().filter(|other| other.t_us != one.t_us);
+        let weight: f64 = others
+            .map(|other| (t_us - other.t_us) / (one.t_us - other.t_us))
+            .product();
+        for (value, own) in values.iter_mut().zip(one.values) {
+            *value += weight * own;
+        }
+    }
+    values
 }
 
 /// Longest time from row to row of a log without a gap, in ticks.
@@ -113,8 +137,8 @@ pub(super) fn join(
     samples: &[Sample],
     reference_us: impl Fn(f64) -> f64,
     (tolerance_us, period_us): (f64, f64),
-    take: &mut dyn FnMut(&JoinedRow) -> Result<(), ImportError>,
-) -> Result<JoinCounts, ImportError> {
+    take: &mut dyn FnMut(&JoinedRow) -> Result<(), JoinError>,
+) -> Result<JoinCounts, JoinError> {
     // The log holds whole microseconds, so the reference is taken there.
     let t_us = |tick: &Tick| reference_us(tick.t_us).round();
     let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(f64::NAN));
@@ -124,7 +148,7 @@ pub(super) fn join(
     };
     let mut counts = JoinCounts {
         ticks: ticks.len(),
-        bus_us: ends(ticks.first().map(t_us), ticks.last().map(t_us)),
+        sensors_us: ends(ticks.first().map(t_us), ticks.last().map(t_us)),
         reference_us: ends(
             samples.first().map(|sample| sample.t_us),
             samples.last().map(|sample| sample.t_us),
@@ -170,7 +194,7 @@ pub(super) fn join(
             t_us: t_us as i64,
             movement,
             values,
-            codes: tick.codes,
+            frame: tick.frame,
         })?;
     }
     Ok(counts)

@@ -1,15 +1,15 @@
-//! Why an import was refused.
+//! Why a join was refused.
 
-use super::join::JoinCounts;
+use super::pairing::JoinCounts;
 use crate::output::OutputError;
 use hal_adapters::candump::LineError;
 use hallstage_input::log::LogError;
 use hallstage_input::stage::StageError;
 use std::path::PathBuf;
 
-/// Why an import was refused. The output is not written.
+/// Why a join was refused. The output is not written.
 #[derive(Debug, thiserror::Error)]
-pub enum ImportError {
+pub enum JoinError {
     /// The stage file is refused.
     #[error(transparent)]
     Stage(#[from] StageError),
@@ -25,6 +25,62 @@ pub enum ImportError {
         line: usize,
         /// Its fault.
         fault: LineError,
+    },
+    /// It is not clear which file has the sensors.
+    #[error(
+        "{} of {} and {} has columns of the Hall probes; name one record of the sensors and one of the reference",
+        if *both { "each" } else { "neither" }, a.display(), b.display()
+    )]
+    Roles {
+        /// A file.
+        a: PathBuf,
+        /// The other file.
+        b: PathBuf,
+        /// Whether both have such columns.
+        both: bool,
+    },
+    /// The time of a table of the sensors starts again.
+    #[error(
+        "{}: in movement {movement} the time starts again; log the sensors by a clock that runs through, or join each movement by itself",
+        path.display()
+    )]
+    TimeRestarts {
+        /// The table.
+        path: PathBuf,
+        /// The movement.
+        movement: i64,
+    },
+    /// The samples of the reference do not follow its motion.
+    #[error(
+        "the reference has a sample in {period_ms:.0} ms, and between them it moves on by {rms_um:.2} um rms that no sample shows; log it faster, \
+         or move more slowly"
+    )]
+    ReferenceTooSlow {
+        /// Time from sample to sample, ms.
+        period_ms: f64,
+        /// What a cubic between the samples misses, um.
+        rms_um: f64,
+    },
+    /// A column is not what stage.toml says.
+    #[error(
+        "with {change} the reference explains {percent:.0} % of the Hall signals' motion, and {without_percent:.0} % without; correct the \
+         columns in [log] of stage.toml, or the cables"
+    )]
+    Columns {
+        /// The change.
+        change: String,
+        /// Share that is explained with it.
+        percent: f64,
+        /// Share without it.
+        without_percent: f64,
+    },
+    /// The motion of the reference has another size than the motion of the probes.
+    #[error(
+        "the motion of the Hall probes is {factor:.3} times the motion of the reference; correct the unit of the reference in [log] of stage.toml"
+    )]
+    Unit {
+        /// The factor.
+        factor: f64,
     },
     /// The record holds frames of several interfaces.
     #[error(
@@ -80,7 +136,7 @@ pub enum ImportError {
     },
     /// Another record begins.
     #[error(
-        "{}, line {line}: the sensor node starts again, and the time goes back by {back_s:.6} s: these are several records; import \
+        "{}, line {line}: the sensor node starts again, and the time goes back by {back_s:.6} s: these are several records; join \
          each by itself",
         path.display()
     )]
@@ -114,17 +170,20 @@ pub enum ImportError {
          the reference's {:.1} s. On its clock the ticks lie from {:.0} to {:.0} us, its samples from {:.0} to {:.0} us; {} ticks \
          are outside its time, {} between movements, {} further than --tolerance-us (one servo period, if it is not given) from \
          a sample. Name records of one run; cut what one record has more than the other; log the reference in every servo period, or give a larger --tolerance-us",
-        .0.rows, .0.ticks, .0.covered_s, .0.reference_s, .0.bus_us[0], .0.bus_us[1], .0.reference_us[0], .0.reference_us[1],
+        .0.rows, .0.ticks, .0.covered_s, .0.reference_s, .0.sensors_us[0], .0.sensors_us[1], .0.reference_us[0], .0.reference_us[1],
         .0.outside, .0.between_movements, .0.too_far
     )]
     Unpaired(JoinCounts),
     /// The reference explains too little of the motion at every offset.
     #[error(
-        "no offset between the clocks within --search-s of its start: at the best one the reference explains {percent:.0} % of the \
-         Hall signals' motion, less than {least_percent:.0} %. Are both records of the same run? Then search further (--search-s), or \
-         start elsewhere (--offset-us)"
+        "no offset between the clocks from {:.1} to {:.1} s: at the best one the reference explains {percent:.0} % of the \
+         Hall signals' motion, less than {least_percent:.0} %. Rates, gaps, signs and the order of the columns are not the cause. Are both \
+         records of the same run? Then search further (--search-s), or start elsewhere (--offset-us)",
+        range_s[0], range_s[1]
     )]
     NoOffset {
+        /// The offsets that were tried, s.
+        range_s: [f64; 2],
         /// Share that is explained.
         percent: f64,
         /// Share that is asked for.
@@ -133,8 +192,8 @@ pub enum ImportError {
     /// The clocks do not run evenly against each other.
     #[error(
         "no steady offset between the clocks makes the reference agree with the Hall signals: they differ in speed by more \
-         than {most_ppm} parts in a million, or that of the reference was set during the record; turn its adjustment off (NTP), and \
-         record again"
+         than {most_ppm} parts in a million, or that of the reference was set during the record; rates, gaps, units, \
+         signs and the order of the columns are not the cause. Turn the adjustment of the clock off (NTP), and record again"
     )]
     UnsteadyClocks {
         /// The largest difference that is looked for, parts in a million.
@@ -156,7 +215,7 @@ pub enum ImportError {
     #[error(
         "in movement {movement} the reference does not agree with the Hall signals at the offset of the others: a clock was set, or the \
          reference starts its time anew in each movement while the bus ran on between; log both by clocks that run through, \
-         or import each movement by itself"
+         or join each movement by itself"
     )]
     Astray {
         /// The movement.

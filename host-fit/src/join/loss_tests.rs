@@ -68,7 +68,7 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
         candump(|n, _| (n < 60).then(|| jittered_us(n))),
     ] {
         let import = files(&bus, &reference());
-        import.refused(|error| matches!(error, ImportError::NoTicks { .. }));
+        import.refused(|error| matches!(error, JoinError::NoTicks { .. }));
     }
 }
 

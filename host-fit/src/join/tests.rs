@@ -108,7 +108,7 @@ pub(super) fn reference_of(ticks: u32, fast: f64, pause_us: Option<f64>) -> Stri
 /// Two records and their stage in a folder, and how they are joined.
 pub(super) struct Import {
     _folder: TempDir,
-    pub(super) settings: ImportSettings,
+    pub(super) settings: JoinSettings,
 }
 
 pub(super) fn files(bus: &str, reference: &str) -> Import {
@@ -117,14 +117,13 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), hallstage_input::shipped::STAGE_TOML).expect("written");
-    let settings = ImportSettings {
-        bus: path("bus.log"),
-        reference: path("ifm.csv"),
+    let settings = JoinSettings {
+        records: [path("bus.log"), path("ifm.csv")],
         stage: path("stage.toml"),
         out: path("log.csv"),
         tolerance_us: None,
         offset_us: None,
-        search_s: 0.4,
+        search_s: Some(0.4),
         interface: None,
         skip_bad_lines: false,
     };
@@ -136,22 +135,38 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
 
 impl Import {
     /// With another setting.
-    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportSettings)) -> Self {
+    pub(super) fn with(mut self, change: impl FnOnce(&mut JoinSettings)) -> Self {
         change(&mut self.settings);
         self
     }
 
-    pub(super) fn run(&self) -> ImportReport {
+    pub(super) fn run(&self) -> JoinReport {
         run(&self.settings, Watch::NONE).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Imports, sees that it is refused, and that nothing is written.
+    /// Joins, sees that it is refused, and that nothing is written.
     #[track_caller]
-    pub(super) fn refused(&self, is_why: impl Fn(&ImportError) -> bool) -> String {
+    pub(super) fn refused(&self, is_why: impl Fn(&JoinError) -> bool) -> String {
         let error = run(&self.settings, Watch::NONE).expect_err("refused");
         assert!(is_why(&error), "{error}");
         assert!(!self.settings.out.exists(), "{error}");
         error.to_string()
+    }
+
+    /// The reference of each row is the pose at its time, and its codes are of that time.
+    #[track_caller]
+    pub(super) fn check_poses(&self, apart: f64) {
+        for row in &self.log().rows {
+            let want = pose(row.t_us as f64);
+            for (have, want) in row.reference.iter().zip(want) {
+                assert!((have - want).abs() < apart, "{} {have} {want}", row.t_us);
+            }
+            let hall = hall(row.t_us as f64);
+            for (have, want) in row.frame.hall().iter().zip(hall) {
+                // 4 um a ms at most: 15 us of offset are 0.06 um, a code.
+                assert!((have - want).abs() <= 2, "{} {have} {want}", row.t_us);
+            }
+        }
     }
 
     /// The log that it wrote.
@@ -177,22 +192,11 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
         (0.01..20.0).contains(&standard_error_us),
         "{standard_error_us}"
     );
-    assert_eq!(report.bus.ticks, TICKS as usize);
+    assert_eq!(report.bus().ticks, TICKS as usize);
     let dataset = import.log();
     assert_eq!(dataset.movements.len(), 3);
     assert!(dataset.rows.len() > 730);
-    for row in &dataset.rows {
-        let want = pose(row.t_us as f64);
-        // 4 um a ms at most: a line over 1 ms follows the sine to 6 nm.
-        for (have, want) in row.reference.iter().zip(want) {
-            assert!((have - want).abs() < 10e-9, "{} {have} {want}", row.t_us);
-        }
-        let hall = hall(row.t_us as f64);
-        for (have, want) in row.frame.hall().iter().zip(hall) {
-            // 15 us of offset are 0.06 um, a code.
-            assert!((have - want).abs() <= 2, "{} {have} {want}", row.t_us);
-        }
-    }
+    import.check_poses(1e-9);
 }
 
 /// Each movement moves one axis, at the same frequency: a run shifted by a whole movement looks
@@ -200,7 +204,7 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
 #[test]
 fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
     let import = files(&candump(|n, _| n >= 460), &reference());
-    let report = import.with(|settings| settings.search_s = 1.2).run();
+    let report = import.with(|settings| settings.search_s = Some(1.2)).run();
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     assert!(report.join.rows > 445);
@@ -211,14 +215,14 @@ fn a_given_offset_is_the_start_of_the_search() {
     let import = |start_us| {
         let import = files(&candump(|_, _| false), &reference());
         import.with(|settings| {
-            (settings.search_s, settings.offset_us) = (0.05, Some(OFFSET_US + start_us));
+            (settings.search_s, settings.offset_us) = (Some(0.05), Some(OFFSET_US + start_us));
         })
     };
     for start_us in [-40_000.0, 40_000.0] {
         let found_us = import(start_us).run().offset.us - OFFSET_US;
         assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     }
-    import(-1e6).refused(|error| matches!(error, ImportError::NoOffset { .. }));
+    import(-1e6).refused(|error| matches!(error, JoinError::NoOffset { .. }));
 }
 
 /// The motion is 212 um rms. With noise of 40 um 96 % of it is explained, but the offset is uncertain by a quarter
@@ -243,7 +247,7 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
     let little_us = standard_error_us(64.0).expect("4 um of noise");
     assert!((30.0..120.0).contains(&little_us), "{little_us}");
     match standard_error_us(640.0) {
-        Err(ImportError::UncertainOffset {
+        Err(JoinError::UncertainOffset {
             standard_error_us,
             most_us: 200.0,
         }) => assert!((300.0..1_200.0).contains(&standard_error_us)),
@@ -269,8 +273,8 @@ fn on_a_circle_the_offset_is_uncertain() {
         let [x, y] = circle(1e3 * f64::from(k));
         writeln!(ifm, "{k}000,{x:.12},{y:.12},0").expect("a string");
     }
-    let import = files(&bus, &ifm).with(|settings| settings.search_s = 0.1);
-    import.refused(|error| matches!(error, ImportError::UncertainOffset { .. }));
+    let import = files(&bus, &ifm).with(|settings| settings.search_s = Some(0.1));
+    import.refused(|error| matches!(error, JoinError::UncertainOffset { .. }));
 }
 
 #[test]
@@ -284,9 +288,9 @@ fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     let import = files(&bus, &ifm);
     let report = import.run();
     assert_eq!(report.reference.duplicates, 1);
-    assert_eq!(report.bus.health.incomplete, 1);
+    assert_eq!(report.bus().health.incomplete, 1);
     // Three ticks are gone; the next tick only resumes the sequence.
-    assert_eq!((report.bus.gaps, report.bus.ticks_missing), (2, 5));
+    assert_eq!((report.bus().gaps, report.bus().ticks_missing), (2, 5));
     assert_eq!(report.join.rows, import.log().rows.len());
 }
 
@@ -300,7 +304,7 @@ fn a_broken_line_is_refused_with_its_number_or_left_out() {
     import.refused(|error| {
         matches!(
             error,
-            ImportError::BadLine {
+            JoinError::BadLine {
                 line: 7,
                 fault: LineError::Malformed { column: 30, .. },
                 ..
@@ -308,7 +312,7 @@ fn a_broken_line_is_refused_with_its_number_or_left_out() {
         )
     });
     let report = import.with(|settings| settings.skip_bad_lines = true).run();
-    assert_eq!(report.bus.bad_lines, 1);
+    assert_eq!(report.bus().bad_lines, 1);
 }
 
 #[test]
@@ -318,7 +322,7 @@ fn records_of_different_runs_and_clocks_are_refused() {
         writeln!(other, "0,{},{},5,{}", k * 1_000, k * 7 % 13, k * 3 % 7).expect("a string");
     }
     let import = files(&candump(|_, _| false), &other);
-    import.refused(|error| matches!(error, ImportError::NoOffset { .. }));
+    import.refused(|error| matches!(error, JoinError::NoOffset { .. }));
 }
 
 /// It is read as every log is, without the columns of the probes.
@@ -343,12 +347,12 @@ fn a_fault_of_the_reference_has_its_place() {
 fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
     let ifm = reference();
     let none = files("(1.000000) can0 123#00\n", &ifm);
-    none.refused(|error| matches!(error, ImportError::NoTicks { frames: 1, .. }));
+    none.refused(|error| matches!(error, JoinError::NoTicks { frames: 1, .. }));
     let two = "(1.000000) can0 123#00\n(1.000000) can1 123#00\n";
     let two = files(two, &ifm);
-    two.refused(|error| matches!(error, ImportError::SeveralInterfaces { line: 2, .. }));
-    let no_file = files("", &ifm).with(|settings| settings.bus = "/no/such/file".into());
-    no_file.refused(|error| matches!(error, ImportError::Log(_)));
+    two.refused(|error| matches!(error, JoinError::SeveralInterfaces { line: 2, .. }));
+    let no_file = files("", &ifm).with(|settings| settings.records[0] = "/no/such/file".into());
+    no_file.refused(|error| matches!(error, JoinError::Log(_)));
 }
 
 #[test]
@@ -361,6 +365,6 @@ fn movements_that_start_their_time_anew_follow_each_other_unless_the_bus_saw_a_p
     assert_eq!(report.reference.restarts, 2);
     assert!(report.join.rows > 730);
     // No offset fits all movements.
-    use ImportError::{Astray, NoOffset};
+    use JoinError::{Astray, NoOffset};
     import(150_000.0).refused(|error| matches!(error, Astray { .. } | NoOffset { .. }));
 }

@@ -1,9 +1,10 @@
 //! Ticks beside the reference: rows of a fit, and what the designed probes explain of the signals.
 
 use super::{Clocks, EXPLAINED_MIN, Records};
-use crate::bus::import::ImportError;
-use crate::bus::import::join::{ReferenceAt, at};
-use crate::bus::import::node_clock::Tick;
+use crate::join::JoinError;
+use crate::join::node_clock::Tick;
+use crate::join::pairing::{ReferenceAt, at};
+use hallstage_input::log::layout::Quantity;
 use hallstage_solver::estimator::rows::{FieldRow, Rows};
 use nalgebra::Vector3;
 
@@ -35,7 +36,12 @@ impl Records<'_> {
                 (before.0 == after.0).then(|| FieldRow {
                     temperature_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
-                    signal_m: row.tick.codes.hall.map(|code| hall_m * f64::from(code)),
+                    signal_m: row
+                        .tick
+                        .frame
+                        .codes
+                        .hall
+                        .map(|code| hall_m * f64::from(code)),
                     vertical,
                     reference: row.pose,
                     rate: std::array::from_fn(rate),
@@ -66,23 +72,25 @@ impl Records<'_> {
 
     /// Z, Rx, Ry of a tick: m, rad, rad.
     fn vertical(&self, tick: &Tick) -> [f64; 3] {
-        let gaps = tick
-            .codes
-            .capacitive
-            .map(|code| f64::from(code) * self.stage.capacitive.m_per_count);
-        (self.per_gap * Vector3::from(gaps)).into()
+        let gaps = tick.frame.codes.capacitive;
+        let gaps_m = gaps.map(|code| f64::from(code) * self.stage.capacitive.m_per_count);
+        let logged = tick
+            .frame
+            .vertical
+            .map(|pose| pose.to_array().map(f64::from));
+        logged.unwrap_or_else(|| (self.per_gap * Vector3::from(gaps_m)).into())
     }
 
     /// Movement and pose at a time of the reference, with this vertical pose.
     fn at(&self, t_us: f64, vertical: [f64; 3]) -> Option<(i64, [f64; 3])> {
         let ReferenceAt::Found {
             movement, values, ..
-        } = at(self.samples, t_us, 2.0 * self.period_us)
+        } = at(self.samples, t_us, 2.0 * self.tolerance_us)
         else {
             return None;
         };
         let values = [0, 1, 2].map(|k| values[k] * self.scale[k]);
-        let pose = match self.is_beams {
+        let pose = match self.quantities == Quantity::BEAMS {
             true => self.stage.interferometer.pose(values, vertical),
             false => values,
         };
@@ -92,13 +100,26 @@ impl Records<'_> {
     /// What the designed probes explain of the signals' motion, each with a factor for all rows and a
     /// constant for each movement, and that motion; codes squared.
     pub(super) fn explained(&self, rows: &[ReferencedTick]) -> [f64; 2] {
+        self.sums(rows)
+            .iter()
+            .fold([0.0; 2], |[explained, motion], [ss, sp, pp]| {
+                // A probe that reads against its designed sense explains nothing.
+                let is_sound = *sp > 0.0 && *pp > 0.0;
+                let own = if is_sound { sp * sp / pp } else { 0.0 };
+                [explained + own, motion + ss]
+            })
+    }
+
+    /// The motion of each signal, its product with the motion of the designed probe, and the motion of the probe:
+    /// codes squared, codes m, m squared.
+    pub(super) fn sums(&self, rows: &[ReferencedTick]) -> [[f64; 3]; 3] {
         let mut sums = [[0.0; 3]; 3];
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
             for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
                 let n = movement.len() as f64;
                 let pair = |row: &ReferencedTick| {
                     let read = self.plane * Vector3::from(row.pose);
-                    [f64::from(row.tick.codes.hall[k]), read[k]]
+                    [f64::from(row.tick.frame.codes.hall[k]), read[k]]
                 };
                 let [signal, probe] =
                     [0, 1].map(|i| movement.iter().map(|row| pair(row)[i]).sum::<f64>() / n);
@@ -111,24 +132,15 @@ impl Records<'_> {
                 }
             }
         }
-        sums.iter()
-            .fold([0.0; 2], |[explained, motion], [ss, sp, pp]| {
-                // A probe that reads against its designed sense explains nothing.
-                let is_sound = *sp > 0.0 && *pp > 0.0;
-                let own = if is_sound { sp * sp / pp } else { 0.0 };
-                [explained + own, motion + ss]
-            })
+        sums
     }
 
     /// The share of the motion that is explained, if it is enough.
-    pub(super) fn share(&self, rows: &[ReferencedTick]) -> Result<f64, ImportError> {
+    pub(super) fn share(&self, rows: &[ReferencedTick]) -> Result<f64, JoinError> {
         let [explained, motion] = self.explained(rows);
         match explained / motion {
             share if share >= EXPLAINED_MIN => Ok(share),
-            share => Err(ImportError::NoOffset {
-                percent: 100.0 * share.max(0.0),
-                least_percent: 100.0 * EXPLAINED_MIN,
-            }),
+            share => Err(self.no_offset(share.max(0.0))),
         }
     }
 }

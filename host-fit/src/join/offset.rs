@@ -1,17 +1,19 @@
 //! The offset between the clocks and their difference in speed, from the motion that both records saw.
 //!
-//! A grid of one servo period around the start finds the offset by correlation: at the right offset each Hall
+//! A grid of one period finds the offset by correlation: at the right offset each Hall
 //! signal is about a sensitivity times the reading of the designed probe at the reference pose. (A fit by all
 //! three axes of the reference would also explain a run shifted by a whole movement: each movement moves one
 //! axis only, and some matrix turns any axis into any other.) From the minute with the most motion, offset
 //! and rate are followed to the ends of the record: they are the lag of the reference and its rate in the fit
 //! of the field model.
 
+mod cause;
 mod rows;
 
-use super::ImportError;
-use super::node_clock::{NodeRun, Tick};
+use super::JoinError;
+use super::node_clock::Tick;
 use super::reference::{Reference, Sample};
+use super::sensors::Sensors;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::clocks::{Alignment, Lag};
@@ -23,10 +25,12 @@ use runtime::capacitive::vertical_per_gap;
 /// The estimated offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// Time of the recorder less time of the reference in the middle of the record, us.
+    /// Time of the sensors' record less time of the reference in the middle of the record, us.
     pub us: f64,
-    /// Relative speed of the sensor node's clock to the clock of the reference, less one.
+    /// Relative speed of the sensors' clock to the clock of the reference, less one.
     pub rate: f64,
+    /// Standard error of the rate.
+    pub rate_standard_error: f64,
     /// Share of the Hall signals' motion that the reference explains.
     pub explained: f64,
     /// Ticks of the fit.
@@ -63,31 +67,48 @@ impl Clocks {
 }
 
 /// Both records.
+#[derive(Clone, Copy)]
 pub(super) struct Records<'r> {
     ticks: &'r [Tick],
+    /// The quantities of the reference.
+    quantities: [Quantity; 3],
+    /// The offsets to try, us, without the time of the recorder.
+    range_us: [f64; 2],
     /// When the record starts, us on the clock of the node.
     start_us: f64,
     /// Time of the recorder less time of the node, us.
     recorder_us: f64,
     samples: &'r [Sample],
     stage: &'r Stage,
+    /// The usual time from tick to tick, us.
     period_us: f64,
+    /// The longer of the periods of the two records, us.
+    tolerance_us: f64,
+    /// The servo period, us.
+    servo_us: f64,
     /// m or rad per unit of the reference's columns.
     scale: [f64; 3],
-    /// Whether the reference has beams.
-    is_beams: bool,
     /// Readings of the designed probes per X, Y, Rz.
     plane: Matrix3<f64>,
     /// Z, Rx, Ry per gap.
     per_gap: Matrix3<f64>,
 }
 
-/// Most ticks of the correlation, and of a fit.
+/// Most ticks of the first correlation, and the periods of its grid; most ticks of the second correlation, on a grid of
+/// one period, and of a fit.
+const SEARCH_TICKS: usize = 500;
+const SEARCH_PERIODS: f64 = 5.0;
 const COARSE_TICKS: usize = 2_000;
 const FIT_TICKS: usize = 10_000;
 
 /// The first stretch of the record that is fitted, us: a wrong rate moves little in it.
 const STRETCH_US: f64 = 60e6;
+
+/// Most minutes of the record that are tried as a start: the reference may have missed the liveliest.
+const MINUTES: usize = 5;
+
+/// How far from a given start the offset is searched, us, if nothing else is asked.
+const SEARCH_US: f64 = 2e6;
 
 /// Most steps for one stretch, and the size of the last one in standard errors.
 const STEPS: usize = 4;
@@ -119,78 +140,134 @@ const STANDARD_ERROR_PERIODS_MAX: f64 = 0.1;
 const APART_PERIODS_MAX: f64 = 0.5;
 
 impl<'r> Records<'r> {
-    pub(super) fn new(run: &'r NodeRun, reference: &'r Reference, stage: &'r Stage) -> Self {
+    pub(super) fn new(sensors: &'r Sensors, reference: &'r Reference, stage: &'r Stage) -> Self {
         Self {
-            ticks: &run.ticks,
-            start_us: -run.since_start_us,
-            recorder_us: run.recorder_less_node_us(),
+            ticks: &sensors.ticks,
+            quantities: reference.quantities,
+            range_us: [0.0; 2],
+            start_us: sensors.start_us,
+            recorder_us: sensors.recorder_us,
             samples: &reference.samples,
-            period_us: stage.servo_period_s * 1e6,
+            period_us: sensors.period_us,
+            tolerance_us: sensors.period_us.max(reference.period_us),
+            servo_us: stage.servo_period_s * 1e6,
             scale: reference.quantities.map(|q| stage.log.column(q).scale),
             stage,
-            is_beams: reference.quantities == Quantity::BEAMS,
             // A checked stage has its sensors in a triangle.
             per_gap: vertical_per_gap(&stage.capacitive_probes_m).unwrap_or_default(),
             plane: stage.geometry().plane(),
         }
     }
 
-    /// Finds the offset within `search_us` of a start: `offset_us`, recorder less reference, or the offset at
-    /// which both records start together.
+    /// Finds the offset within `search_s` of a start: of `offset_us` (sensors less reference), or of a common start of
+    /// both records. Without both arguments, wherever half of the shorter record has a partner.
     ///
     /// # Errors
-    /// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`.
+    /// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`, `Columns`, `Unit`.
     pub(super) fn estimate(
-        &self,
+        mut self,
         offset_us: Option<f64>,
-        search_us: f64,
-    ) -> Result<(Clocks, Offset), ImportError> {
-        let first_us = self.samples.first().map_or(0.0, |sample| sample.t_us);
-        let together_us = self.start_us - first_us;
-        let start_us = offset_us.map_or(together_us, |us| us - self.recorder_us);
-        let start = self.coarse(start_us, search_us);
-        let (found, offset) = self.follow(start)?;
-        let most_us = STANDARD_ERROR_PERIODS_MAX * self.period_us;
+        search_s: Option<f64>,
+    ) -> Result<(Clocks, Offset), JoinError> {
+        self.range_us = self.range_us(offset_us, search_s.map(|search_s| search_s * 1e6));
+        let minutes = self.liveliest();
+        let mut outcome = Err(self.no_offset(0.0));
+        for minute in minutes.into_iter().take(MINUTES) {
+            let start = self.coarse(minute);
+            self.check_unit(minute, &start)?;
+            outcome = self.follow(start).map(|found| (start, found));
+            if !matches!(outcome, Err(JoinError::NoOffset { .. })) {
+                break;
+            }
+        }
+        let (start, (found, offset)) = outcome.map_err(|error| self.cause(error))?;
+        let most_us = STANDARD_ERROR_PERIODS_MAX * self.servo_us;
         if offset.standard_error_us > most_us {
-            return Err(ImportError::UncertainOffset {
+            return Err(JoinError::UncertainOffset {
                 standard_error_us: offset.standard_error_us,
                 most_us,
             });
         }
         let moved_us = found.about(start.middle_us).us - start.us;
-        if moved_us.abs() > COARSE_PERIODS_MAX * self.period_us {
-            return Err(UNSTEADY);
+        if moved_us.abs() > COARSE_PERIODS_MAX * self.servo_us {
+            return Err(self.cause(UNSTEADY));
         }
         Ok((found, offset))
     }
 
-    /// The minute with the most motion.
-    fn liveliest(&self) -> &'r [Tick] {
+    fn range_us(&self, offset_us: Option<f64>, search_us: Option<f64>) -> [f64; 2] {
+        let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(0.0));
+        let tick = |tick: &Tick| tick.t_us;
+        let sample = |sample: &Sample| sample.t_us;
+        let ticks = ends(self.ticks.first().map(tick), self.ticks.last().map(tick));
+        let samples = ends(
+            self.samples.first().map(sample),
+            self.samples.last().map(sample),
+        );
+        let start_us = match offset_us {
+            Some(us) => us - self.recorder_us,
+            None => self.start_us - samples[0],
+        };
+        let search_us = search_us.or(offset_us.map(|_| SEARCH_US));
+        match search_us {
+            Some(search_us) => [start_us - search_us, start_us + search_us],
+            None => {
+                let half_us = 0.5 * (ticks[1] - ticks[0]).min(samples[1] - samples[0]);
+                [
+                    ticks[0] - samples[1] + half_us,
+                    ticks[1] - samples[0] - half_us,
+                ]
+            }
+        }
+    }
+
+    /// The minutes of the record, the liveliest first.
+    fn liveliest(&self) -> Vec<&'r [Tick]> {
         let ticks = (STRETCH_US / self.period_us).max(1.0);
         let parts = (self.ticks.len() as f64 / ticks).ceil().max(1.0) as usize;
         let minutes = self.ticks.chunks(self.ticks.len().div_ceil(parts).max(1));
         let variance = |ticks: &[Tick], k: usize| {
-            let codes = || ticks.iter().map(|tick| f64::from(tick.codes.hall[k]));
+            let codes = || ticks.iter().map(|tick| f64::from(tick.frame.codes.hall[k]));
             let mean = codes().sum::<f64>() / ticks.len() as f64;
             codes().map(|code| (code - mean).powi(2)).sum::<f64>()
         };
         let motion = |ticks: &&[Tick]| [0, 1, 2].map(|k| variance(ticks, k)).iter().sum::<f64>();
-        let most = minutes.max_by(|a, b| motion(a).total_cmp(&motion(b)));
-        most.unwrap_or_default()
+        let mut minutes: Vec<&[Tick]> = minutes.collect();
+        minutes.sort_by(|a, b| motion(b).total_cmp(&motion(a)));
+        minutes
     }
 
-    /// The best offset on a grid of one servo period.
-    fn coarse(&self, start_us: f64, search_us: f64) -> Clocks {
-        let minute = self.liveliest();
-        let points: Vec<Tick> = thinned(minute, COARSE_TICKS).collect();
-        let steps = (search_us / self.period_us).ceil().clamp(1.0, 1e6) as i32;
-        let clocks = |step: i32| Clocks {
-            us: start_us + f64::from(step) * self.period_us,
+    /// The best offset of the range on a grid of one period.
+    fn coarse(&self, minute: &[Tick]) -> Clocks {
+        let wide_us = SEARCH_PERIODS * self.period_us;
+        let [first_us, last_us] = self.range_us;
+        let near = match last_us - first_us > COARSE_TICKS as f64 * self.period_us {
+            false => self.range_us,
+            true => {
+                let found = self.best(minute, SEARCH_TICKS, self.range_us, wide_us);
+                [found.us - wide_us, found.us + wide_us]
+            }
+        };
+        self.best(minute, COARSE_TICKS, near, self.period_us)
+    }
+
+    /// The best offset of a range on a grid, by a number of ticks.
+    fn best(
+        &self,
+        minute: &[Tick],
+        ticks: usize,
+        [first_us, last_us]: [f64; 2],
+        step_us: f64,
+    ) -> Clocks {
+        let points: Vec<Tick> = thinned(minute, ticks).collect();
+        let steps = ((last_us - first_us) / step_us).ceil().clamp(0.0, 1e7) as u32;
+        let clocks = |step: u32| Clocks {
+            us: first_us + f64::from(step) * step_us,
             rate: 0.0,
             middle_us: middle_us(minute),
         };
-        let trial = |step: i32| (self.explained(&self.rows(&points, &clocks(step)))[0], step);
-        let trials: Vec<(f64, i32)> = (-steps..steps + 1).into_par_iter().map(trial).collect();
+        let trial = |step: u32| (self.explained(&self.rows(&points, &clocks(step)))[0], step);
+        let trials: Vec<(f64, u32)> = (0..steps + 1).into_par_iter().map(trial).collect();
         // The first of equals.
         let best = trials.iter().rev().max_by(|a, b| a.0.total_cmp(&b.0));
         clocks(best.map_or(0, |(_, step)| *step))
@@ -200,7 +277,7 @@ impl<'r> Records<'r> {
     ///
     /// # Errors
     /// `NoOffset`, `UnsteadyClocks`, `Astray`.
-    fn follow(&self, start: Clocks) -> Result<(Clocks, Offset), ImportError> {
+    fn follow(&self, start: Clocks) -> Result<(Clocks, Offset), JoinError> {
         let far_us = |tick: Option<&Tick>| tick.map_or(0.0, |t| (t.t_us - start.middle_us).abs());
         let half_us = far_us(self.ticks.first()).max(far_us(self.ticks.last()));
         let mut clocks = start;
@@ -235,6 +312,7 @@ impl<'r> Records<'r> {
                     rate: clocks.rate,
                     explained: share.max(self.share(&rows)?),
                     ticks: rows.len(),
+                    rate_standard_error: lag.rate_standard_error,
                     standard_error_us: 1e6 * lag.standard_errors_s[0].max(lag.standard_errors_s[1]),
                 };
                 return Ok((clocks, offset));
@@ -249,7 +327,7 @@ impl<'r> Records<'r> {
         alignment: &mut Alignment,
         rows: &[ReferencedTick],
         clocks: &mut Clocks,
-    ) -> Result<Lag, ImportError> {
+    ) -> Result<Lag, JoinError> {
         let lag = alignment
             .step(&self.field_rows(rows, clocks))
             .ok_or(UNSTEADY)?;
@@ -269,7 +347,7 @@ impl<'r> Records<'r> {
         rows: &[ReferencedTick],
         clocks: &Clocks,
         excess: f64,
-    ) -> Result<(), ImportError> {
+    ) -> Result<(), JoinError> {
         let key = |row: &ReferencedTick| (row.movement, (row.tick.t_us / PIECE_US).floor() as i64);
         let least_motion = MOTION_MIN * self.explained(rows)[1] / rows.len() as f64;
         for piece in rows.chunk_by(|a, b| key(a) == key(b)) {
@@ -279,18 +357,18 @@ impl<'r> Records<'r> {
             let own = alignment.own_lag_s(&self.field_rows(piece, clocks));
             let is_far = own.is_some_and(|[lag_s, standard_error_s]| {
                 let most_s = STANDARD_ERRORS * standard_error_s * excess.sqrt();
-                lag_s.abs() > 1e-6 * APART_PERIODS_MAX * self.period_us + most_s
+                lag_s.abs() > 1e-6 * APART_PERIODS_MAX * self.servo_us + most_s
             });
             if is_far || !is_explained {
                 let movement = piece.first().map_or(0, |row| row.movement);
-                return Err(ImportError::Astray { movement });
+                return Err(JoinError::Astray { movement });
             }
         }
         Ok(())
     }
 }
 
-const UNSTEADY: ImportError = ImportError::UnsteadyClocks {
+const UNSTEADY: JoinError = JoinError::UnsteadyClocks {
     most_ppm: RATE_MAX * 1e6,
 };
 

@@ -4,9 +4,9 @@
 //! Between two successive time frames each recorded tick has one place. Ticks beside a time frame that is missing
 //! or out of order are skipped: 16 ticks may be lost there unseen, and receive times do not show it.
 
-use super::bus_log::BusTick;
+use crate::bus::bus_log::BusTick;
 use hal_adapters::can::sensor::TickTime;
-use runtime::RawFrame;
+use hallstage_input::dataset::LoggedFrame;
 
 /// Range of the numbers in time frames.
 const NUMBERS: u32 = 1 << 20;
@@ -24,12 +24,12 @@ const CLOCK_SHARE: f64 = 1e-3;
 /// recorder's clock and the node's.
 const BLOCK_TICKS: usize = 250;
 
-/// Codes of a tick.
+/// What the sensors read at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tick {
-    /// Time of their sample, us since the first time frame of the run by the node's clock.
+    /// By the clock of the record, us; on the bus since the first time frame of the run.
     pub(super) t_us: f64,
-    pub(super) codes: RawFrame,
+    pub(super) frame: LoggedFrame,
 }
 
 /// Ticks since the node started.
@@ -53,7 +53,7 @@ impl NodeRun {
         }
         self.ticks.push(Tick {
             t_us,
-            codes: tick.codes,
+            frame: tick.codes.into(),
         });
     }
 
@@ -186,6 +186,7 @@ impl NodeClock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use runtime::RawFrame;
 
     /// Ticks carry their own number, from 1, by their code.
     fn tick(n: u32) -> BusTick {
@@ -228,10 +229,10 @@ mod tests {
                         let ticks = run.ticks.len() + untimed;
                         assert!(ticks as u32 + count + refused == 700, "{what}: {ticks}");
                         assert!(run.ticks.len() as u32 + count > 630, "{what}: {untimed}");
-                        let zero_us =
-                            run.ticks[0].t_us - 2_000.0 * f64::from(run.ticks[0].codes.hall[0]);
+                        let zero_us = run.ticks[0].t_us
+                            - 2_000.0 * f64::from(run.ticks[0].frame.codes.hall[0]);
                         for tick in &run.ticks {
-                            let n_us = 2_000.0 * f64::from(tick.codes.hall[0]);
+                            let n_us = 2_000.0 * f64::from(tick.frame.codes.hall[0]);
                             assert_eq!(tick.t_us - n_us, zero_us, "{what}");
                         }
                     }
@@ -258,7 +259,7 @@ mod tests {
         let (run, untimed) = clock.into_longest();
         assert_eq!((run.ticks.len(), untimed), (192, 108));
         assert_eq!(
-            (run.ticks[20].t_us, run.ticks[20].codes.hall[0]),
+            (run.ticks[20].t_us, run.ticks[20].frame.codes.hall[0]),
             (40_000.0, 20)
         );
     }

@@ -17,7 +17,7 @@ pub struct BusTick {
 
 impl BusTick {
     /// The last four bits of its number.
-    pub(super) const fn counter(&self) -> u32 {
+    pub(crate) const fn counter(&self) -> u32 {
         self.codes.sequence & 0xf
     }
 }
@@ -55,7 +55,7 @@ const TIMING: Timing = Timing {
 
 /// Frames to whole ticks, counted.
 #[derive(Clone, Debug, Default)]
-pub(in crate::bus) struct Collector {
+pub(crate) struct Collector {
     /// As the first frame with codes shows.
     layout: Option<Layout>,
     receiver: Option<SensorReceiver>,
@@ -66,7 +66,7 @@ pub(in crate::bus) struct Collector {
 
 impl Collector {
     /// Takes a frame; gives the tick that it completes.
-    pub(in crate::bus) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
+    pub(crate) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
         self.counts.frames += 1;
         if self.layout.is_none() {
             self.layout = Message::from_id(stamped.frame.id).and_then(Layout::from_message);
@@ -102,7 +102,7 @@ impl Collector {
     }
 
     /// The counts so far.
-    pub(in crate::bus) fn counts(&self) -> BusCounts {
+    pub(crate) fn counts(&self) -> BusCounts {
         let health = self.receiver.as_ref().map(SensorReceiver::health);
         BusCounts {
             health: health.copied().unwrap_or_default(),
@@ -111,7 +111,7 @@ impl Collector {
     }
 
     /// The layout of the codes, once known.
-    pub(in crate::bus) const fn layout(&self) -> Option<Layout> {
+    pub(crate) const fn layout(&self) -> Option<Layout> {
         self.layout
     }
 }

@@ -1,19 +1,17 @@
 //! A candump log to ticks with the times of their samples.
 
-use super::bus_log::{BusCounts, BusTick, Collector};
 use super::node_clock::{NodeClock, NodeRun};
-use super::{ImportError, ImportSettings};
+use super::{JoinError, JoinSettings};
+use crate::bus::bus_log::{BusCounts, BusTick, Collector};
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
-use hallstage_input::log::LogError;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
-use hallstage_input::other_format;
-use hallstage_input::source::{SourceError, SourceProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 use hallstage_input::watch::Watch;
+use std::path::PathBuf;
 
 /// Most ticks of a record: two hours at 500 Hz.
 const TICKS_MAX: usize = 3_600_000;
@@ -23,11 +21,14 @@ const TICKS_MAX: usize = 3_600_000;
 /// # Errors
 /// `Log`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
 pub(super) fn read(
-    settings: &ImportSettings,
+    text: TextReader<'_>,
+    settings: &JoinSettings,
     stage: &Stage,
     watch: Watch<'static>,
-) -> Result<(NodeRun, BusCounts), ImportError> {
+) -> Result<(NodeRun, BusCounts), JoinError> {
+    let path = text.path().to_path_buf();
     let mut reader = BusReader {
+        path: path.clone(),
         settings,
         stage,
         line: 0,
@@ -40,13 +41,12 @@ pub(super) fn read(
         clock: NodeClock::new(stage.servo_period_s * 1e6),
         counts: BusCounts::default(),
     };
-    let text = TextReader::open(&settings.bus).map_err(LogError::from)?;
     let mut lines = Lines::new(text).watched(watch, "reading the bus");
     while let Some(line) = lines.next_line()? {
         reader.take_line(&String::from_utf8_lossy(line))?;
         if reader.clock.timed() > TICKS_MAX {
-            return Err(ImportError::TooLong {
-                path: settings.bus.clone(),
+            return Err(JoinError::TooLong {
+                path,
                 what: "ticks",
                 most: TICKS_MAX,
             });
@@ -63,8 +63,8 @@ pub(super) fn read(
         ..reader.collector.counts()
     };
     if run.ticks.len() < TICKS_MIN {
-        return Err(ImportError::NoTicks {
-            path: settings.bus.clone(),
+        return Err(JoinError::NoTicks {
+            path,
             frames: counts.frames,
             saturated: counts.saturated,
             ticks: counts.ticks,
@@ -78,7 +78,8 @@ const TICKS_MIN: usize = 125;
 
 /// A record of the bus while it is read.
 struct BusReader<'s> {
-    settings: &'s ImportSettings,
+    path: PathBuf,
+    settings: &'s JoinSettings,
     stage: &'s Stage,
     /// Number of the current line, from 1.
     line: usize,
@@ -91,7 +92,7 @@ struct BusReader<'s> {
 }
 
 impl BusReader<'_> {
-    fn take_line(&mut self, line: &str) -> Result<(), ImportError> {
+    fn take_line(&mut self, line: &str) -> Result<(), JoinError> {
         self.line += 1;
         if line.trim_ascii().is_empty() {
             return Ok(());
@@ -113,36 +114,23 @@ impl BusReader<'_> {
                 self.counts.bad_lines += 1;
                 Ok(())
             }
-            Err(fault) => Err(self.bad_line(line, fault)),
-        }
-    }
-
-    /// The error of a line, which may show that the file is no record of candump.
-    fn bad_line(&self, line: &str, fault: LineError) -> ImportError {
-        let path = self.settings.bus.clone();
-        let other = other_format::in_text(line.as_bytes());
-        match other.filter(|_| self.line == 1 && !line.trim_ascii().starts_with('(')) {
-            Some(looks_like) => {
-                let problem = SourceProblem::OtherFormat { looks_like };
-                LogError::from(SourceError { path, problem }).into()
-            }
-            None => ImportError::BadLine {
-                path,
+            Err(fault) => Err(JoinError::BadLine {
+                path: self.path.clone(),
                 line: self.line,
                 fault,
-            },
+            }),
         }
     }
 
-    fn take(&mut self, stamped: &StampedFrame) -> Result<(), ImportError> {
+    fn take(&mut self, stamped: &StampedFrame) -> Result<(), JoinError> {
         if let Some(mut tick) = self.collector.take(stamped) {
             tick.is_saturated = self.is_saturated(&tick)?;
             self.counts.saturated += usize::from(tick.is_saturated);
             self.clock.take(tick);
         } else if let Some(time) = read_time(&stamped.frame) {
             let taken = self.clock.take_time(time, stamped.time_us);
-            taken.map_err(|back_us| ImportError::TwoRecords {
-                path: self.settings.bus.clone(),
+            taken.map_err(|back_us| JoinError::TwoRecords {
+                path: self.path.clone(),
                 line: self.line,
                 back_s: back_us as f64 * 1e-6,
             })?;
@@ -151,7 +139,7 @@ impl BusReader<'_> {
     }
 
     /// Whether a tick has a code at a rail of its converter.
-    fn is_saturated(&self, tick: &BusTick) -> Result<bool, ImportError> {
+    fn is_saturated(&self, tick: &BusTick) -> Result<bool, JoinError> {
         let (hall, gaps) = (&self.stage.hall, &self.stage.capacitive);
         let hall = (Quantity::HALL.into_iter().zip(tick.codes.hall)).map(|code| (hall, code));
         let gaps = (Quantity::GAPS.into_iter().zip(tick.codes.capacitive)).map(|code| (gaps, code));
@@ -159,8 +147,8 @@ impl BusReader<'_> {
         for (converter, (quantity, code)) in hall.chain(gaps) {
             let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
             if !(code_min..=code_max).contains(&code) {
-                return Err(ImportError::OutsideConverter {
-                    path: self.settings.bus.clone(),
+                return Err(JoinError::OutsideConverter {
+                    path: self.path.clone(),
                     line: self.line,
                     sensor: quantity.key(),
                     code,
@@ -174,15 +162,15 @@ impl BusReader<'_> {
     }
 
     /// Whether a frame belongs to the chosen interface, or without a choice to the interface of the first frame.
-    fn is_chosen(&mut self, found: &LogLine<'_>) -> Result<bool, ImportError> {
+    fn is_chosen(&mut self, found: &LogLine<'_>) -> Result<bool, JoinError> {
         let interface = self
             .interface
             .get_or_insert_with(|| found.interface.to_owned());
         if interface == found.interface || self.settings.interface.is_some() {
             return Ok(interface == found.interface);
         }
-        Err(ImportError::SeveralInterfaces {
-            path: self.settings.bus.clone(),
+        Err(JoinError::SeveralInterfaces {
+            path: self.path.clone(),
             line: self.line,
             interface: interface.clone(),
             other: found.interface.to_owned(),

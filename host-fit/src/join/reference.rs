@@ -1,6 +1,6 @@
 //! The log of the interferometers.
 
-use super::ImportError;
+use super::JoinError;
 use hallstage_input::log::cell::{CellFault, WHOLE_MAX};
 use hallstage_input::log::header::{Header, Source};
 use hallstage_input::log::layout::{Dimension, Quantity};
@@ -11,6 +11,7 @@ use hallstage_input::log::time::Clock;
 use hallstage_input::log::{LogError, LogProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
+use hallstage_input::watch::Watch;
 use std::path::Path;
 
 /// One sample of the reference.
@@ -56,6 +57,9 @@ struct Value {
     unit: &'static str,
 }
 
+/// Error of a cubic in the middle between samples, in fourth differences.
+const CUBIC: f64 = 3.0 / 128.0;
+
 /// Most rows of a log: two hours at 1 kHz.
 const ROWS_MAX: usize = 7_200_000;
 
@@ -65,6 +69,8 @@ pub(super) struct Reference {
     pub(super) quantities: [Quantity; 3],
     /// In ascending order of time.
     pub(super) samples: Vec<Sample>,
+    /// The median time from sample to sample, us.
+    pub(super) period_us: f64,
     pub(super) counts: ReferenceCounts,
 }
 
@@ -75,9 +81,14 @@ impl Reference {
     /// # Errors
     /// `Log` for cells, time that runs backwards and movements that return; `NoReference`;
     /// `TooLong`.
-    pub(super) fn read(path: &Path, stage: &Stage) -> Result<Self, ImportError> {
+    pub(super) fn read(
+        path: &Path,
+        stage: &Stage,
+        watch: Watch<'static>,
+    ) -> Result<Self, JoinError> {
         let text = TextReader::open(path).map_err(LogError::from)?;
-        let mut table = Table::open(text, |name| stage.log.knows(name))?;
+        let table = Table::open(text, |name| stage.log.knows(name))?;
+        let mut table = table.watched(watch, "reading the reference");
         let (quantities, cells) = Cells::find(&table, stage)?;
         let movement = cells.movement;
         let period_us = table.period_us(cells.time, movement)?.unwrap_or_default();
@@ -94,7 +105,7 @@ impl Reference {
         while table.next_row()? {
             counts.rows += 1;
             if counts.rows > ROWS_MAX {
-                return Err(ImportError::TooLong {
+                return Err(JoinError::TooLong {
                     path: table.head.path,
                     what: "rows",
                     most: ROWS_MAX,
@@ -137,13 +148,49 @@ impl Reference {
             samples.push(sample);
         }
         match samples.len() {
-            0 | 1 => Err(ImportError::NoReference {
+            0 | 1 => Err(JoinError::NoReference {
                 path: table.head.path,
             }),
             _ => Ok(Self {
                 quantities,
                 samples,
+                period_us,
                 counts,
+            }),
+        }
+    }
+}
+
+impl Reference {
+    /// Checks that a cubic through four samples follows the motion: the fourth differences are small.
+    ///
+    /// # Errors
+    /// `ReferenceTooSlow`.
+    pub(super) fn check_speed(&self, stage: &Stage) -> Result<(), JoinError> {
+        let scale = self
+            .quantities
+            .map(|quantity| stage.log.column(quantity).scale);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for five in self.samples.windows(5) {
+            let is_even = five.windows(2).all(|pair| {
+                let step_us = pair[1].t_us - pair[0].t_us;
+                pair[0].movement == pair[1].movement && step_us < 1.5 * self.period_us
+            });
+            if is_even {
+                // The third value may be a rotation.
+                for (k, scale) in scale.iter().enumerate().take(2) {
+                    let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|at| scale * five[at].values[k]);
+                    sum += (CUBIC * (a - 4.0 * b + 6.0 * c - 4.0 * d + e)).powi(2);
+                    count += 1.0;
+                }
+            }
+        }
+        let rms_m = (sum / f64::max(count, 1.0)).sqrt();
+        match rms_m <= stage.hall.m_per_count {
+            true => Ok(()),
+            false => Err(JoinError::ReferenceTooSlow {
+                period_ms: self.period_us * 1e-3,
+                rms_um: rms_m * 1e6,
             }),
         }
     }

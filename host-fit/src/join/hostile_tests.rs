@@ -11,14 +11,14 @@ fn two_records_in_one_file_are_refused_where_the_second_begins() {
     let second = bus.lines().count() + 1;
     let second = second..second + 40;
     twice.refused(
-        |error| matches!(error, ImportError::TwoRecords { line, .. } if second.contains(line)),
+        |error| matches!(error, JoinError::TwoRecords { line, .. } if second.contains(line)),
     );
 }
 
 #[test]
 fn a_bus_that_saw_little_of_the_reference_is_refused() {
     let import = files(&candump(|n, _| !(100..450).contains(&n)), &reference());
-    import.refused(|error| matches!(error, ImportError::Unpaired { .. }));
+    import.refused(|error| matches!(error, JoinError::Unpaired { .. }));
 }
 
 #[test]
@@ -31,25 +31,27 @@ fn codes_beyond_the_converter_are_refused_and_those_at_its_rails_left_out() {
     };
     // A motion of 300 um has codes up to 4800; with the lever arm more.
     let beyond = import("4000");
-    beyond.refused(|error| matches!(error, ImportError::OutsideConverter { .. }));
+    beyond.refused(|error| matches!(error, JoinError::OutsideConverter { .. }));
     let at_rails = import("4800");
     let report = at_rails.run();
-    assert!(report.bus.saturated > 0);
+    assert!(report.bus().saturated > 0);
     assert_eq!(at_rails.log().rows.len(), report.join.rows);
 }
 
 #[test]
-fn a_reference_slower_than_the_servo_is_named_as_that() {
+fn a_slow_reference_is_joined_as_long_as_its_samples_show_the_motion() {
     let ifm = reference();
     let (head, rows) = ifm.split_once('\n').expect("a header");
-    let slow: Vec<&str> = rows.lines().step_by(5).collect();
-    let slow = format!("{head}\n{}", slow.join("\n"));
-    let import = files(&candump(|_, _| false), &slow);
-    import.refused(
-        |error| matches!(error, ImportError::Unpaired(counts) if 2 * counts.too_far > counts.ticks),
-    );
-    // A line over 5 ms.
-    import
-        .with(|settings| settings.tolerance_us = Some(5_000))
-        .run();
+    let every = |step: usize| {
+        let slow: Vec<&str> = rows.lines().step_by(step).collect();
+        files(
+            &candump(|_, _| false),
+            &format!("{head}\n{}", slow.join("\n")),
+        )
+    };
+    // One sample in 5 ms, a servo period of 2 ms.
+    let join = every(5);
+    join.run();
+    join.check_poses(30e-9);
+    every(60).refused(|error| matches!(error, JoinError::ReferenceTooSlow { .. }));
 }

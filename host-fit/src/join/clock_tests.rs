@@ -7,7 +7,7 @@ const TICKS: u32 = 57_000;
 
 /// Imports a record of a computer with a true clock: controller and interferometer run faster by these shares.
 /// Also gives the largest distance between codes and reference in a row, m.
-fn imported(controller: f64, interferometer: f64) -> Result<(f64, ImportReport), ImportError> {
+fn imported(controller: f64, interferometer: f64) -> Result<(f64, JoinReport), JoinError> {
     let true_us = |n: u32| 2_000.0 * f64::from(n) / (1.0 + controller) + 300.0;
     let bus = record(
         TICKS,
@@ -15,7 +15,7 @@ fn imported(controller: f64, interferometer: f64) -> Result<(f64, ImportReport),
         |n, _, _| Some(true_us(n) + 150.0 + f64::from(n * 7919 % 101)),
     );
     let reference = reference_of(TICKS, interferometer, None);
-    let import = files(&bus, &reference).with(|settings| settings.search_s = 0.1);
+    let import = files(&bus, &reference).with(|settings| settings.search_s = Some(0.1));
     let report = run(&import.settings, Watch::NONE)?;
     let distance = import.log().rows.into_iter().flat_map(|row| {
         let codes = row.frame.hall().map(|code| f64::from(code) * M_PER_CODE);
@@ -29,7 +29,7 @@ fn imported(controller: f64, interferometer: f64) -> Result<(f64, ImportReport),
 fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
     for (controller, interferometer) in [(50e-6, 0.0), (-50e-6, 50e-6)] {
         let (distance_m, report) = imported(controller, interferometer).expect("imported");
-        assert_eq!(report.bus.ticks, TICKS as usize);
+        assert_eq!(report.bus().ticks, TICKS as usize);
         assert!(report.join.rows > 56_800, "{:?}", report.join);
         let rate = report.offset.rate - controller + interferometer;
         assert!(rate.abs() < 0.2e-6, "{rate}");
@@ -41,6 +41,6 @@ fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
 #[test]
 fn clocks_too_far_apart_in_speed_are_refused() {
     let refused = imported(0.0, 1000e-6).expect_err("refused");
-    let is_speed = matches!(refused, ImportError::UnsteadyClocks { .. });
+    let is_speed = matches!(refused, JoinError::UnsteadyClocks { .. });
     assert!(is_speed, "{refused}");
 }

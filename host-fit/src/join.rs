@@ -1,0 +1,159 @@
+//! `join`: a record of the sensors and a record of the reference, each with its own clock, become one calibration log.
+//!
+//! | step | module |
+//! |---|---|
+//! | lines of `candump -L` to ticks, by the receiver of the bus | `bus_reader`, [`bus_log`](crate::bus::bus_log) |
+//! | the time of each tick's sample, by the clock of the node | `node_clock` |
+//! | the sensors: a record of the bus, or a table | `sensors` |
+//! | the reference: a table | [`reference`](mod@reference) |
+//! | offset and difference in speed of the clocks, from the motion | [`offset`] |
+//! | the reference at the times of the ticks | [`pairing`] |
+
+mod bus_reader;
+mod error;
+mod node_clock;
+pub mod offset;
+pub mod pairing;
+pub mod reference;
+mod sensors;
+
+pub use error::JoinError;
+
+use crate::bus::BusAddress;
+use crate::bus::bus_log::BusCounts;
+use crate::output::Output;
+use hallstage_input::log_format::LogFormat;
+use hallstage_input::stage::Stage;
+use hallstage_input::watch::Watch;
+use node_clock::Tick;
+use offset::{Offset, Records};
+use pairing::{JoinCounts, join};
+use reference::{Reference, ReferenceCounts};
+use runtime::frame::MISSING_CODE;
+use sensors::{Sensors, sensors_first};
+use std::path::PathBuf;
+
+/// Settings of `join`.
+#[derive(Clone, Debug)]
+pub(crate) struct JoinSettings {
+    /// The records of the sensors and of the reference, in any order: a record of the bus, as `record`,
+    /// `live --record` or `candump` writes it, or tables in the columns that stage.toml names.
+    pub(crate) records: [PathBuf; 2],
+    /// The stage as designed.
+    pub(crate) stage: PathBuf,
+    /// Where to write the calibration log.
+    pub(crate) out: PathBuf,
+    /// Largest time from a row of the sensors to the samples of the reference before and after it, us; the longer of
+    /// the periods of the two records if not given.
+    pub(crate) tolerance_us: Option<u32>,
+    /// Start of the search: time of the sensors less time of the reference, us.
+    pub(crate) offset_us: Option<f64>,
+    /// How far from its start, or from a common start of both records, the offset is searched, s. Without it and
+    /// without a start, everywhere where half of the shorter record has a partner.
+    pub(crate) search_s: Option<f64>,
+    /// Only frames of this interface, where the record holds several; can0@5 for the frames of node 5.
+    pub(crate) interface: Option<BusAddress>,
+    /// Leave out lines that cannot be read, and count them.
+    pub(crate) skip_bad_lines: bool,
+}
+
+/// The result of a join.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JoinReport {
+    /// Frames and ticks of a record of the bus.
+    pub bus: Option<BusCounts>,
+    /// Rows of a table of the sensors that were left out.
+    pub skipped_rows: usize,
+    /// Rows of the reference.
+    pub reference: ReferenceCounts,
+    /// Offset between the clocks.
+    pub offset: Offset,
+    /// Rows of the log.
+    pub join: JoinCounts,
+    /// The record has temperatures, but the stage names no columns for them: the log has none.
+    pub temperatures_left_out: bool,
+}
+
+#[cfg(test)]
+impl JoinReport {
+    fn bus(&self) -> &BusCounts {
+        self.bus.as_ref().expect("a record of the bus")
+    }
+}
+
+/// Bytes of the log that are written at a time, about.
+const TEXT_BYTES: usize = 1 << 16;
+
+/// Reads both records, joins them and writes the log.
+///
+/// # Errors
+/// See [`JoinError`]; nothing is written then.
+pub(crate) fn run(settings: &JoinSettings, watch: Watch<'static>) -> Result<JoinReport, JoinError> {
+    let stage = Stage::from_file(&settings.stage)?;
+    let [a, b] = settings.records.each_ref().map(PathBuf::as_path);
+    let [sensors, reference] = sensors_first(a, b, &stage)?;
+    let sensors = Sensors::read(sensors, settings, &stage, watch)?;
+    let reference = Reference::read(reference, &stage, watch)?;
+    reference.check_speed(&stage)?;
+    let records = Records::new(&sensors, &reference, &stage);
+    let (clocks, offset) = records.estimate(settings.offset_us, settings.search_s)?;
+
+    let has_temperature = |tick: &Tick| tick.frame.codes.temperature_mc != [MISSING_CODE; 2];
+    let has_temperatures = sensors.ticks.iter().any(has_temperature);
+    let format = LogFormat::new(
+        reference.quantities,
+        sensors.vertical(),
+        has_temperatures,
+        &stage,
+    );
+    let mut log = Output::create(&settings.out)?;
+    let mut text = format.header();
+    let period_us = sensors.period_us.max(reference.period_us);
+    let tolerance_us = settings.tolerance_us.map_or(period_us, f64::from);
+    let join = join(
+        &sensors.ticks,
+        &reference.samples,
+        |t_us| clocks.on_reference_us(t_us),
+        (tolerance_us, period_us),
+        &mut |row| {
+            format.append(&mut text, (row.movement, row.t_us), row.values, &row.frame);
+            if text.len() > TEXT_BYTES {
+                log.write(text.as_bytes())?;
+                text.clear();
+            }
+            Ok(())
+        },
+    )?;
+    join.check()?;
+    log.write(text.as_bytes())?;
+    log.finish()?;
+    Ok(JoinReport {
+        bus: sensors.bus,
+        skipped_rows: sensors.skipped_rows,
+        reference: reference.counts,
+        offset,
+        join,
+        temperatures_left_out: has_temperatures
+            && stage.temperature.columns.iter().all(Option::is_none),
+    })
+}
+
+#[cfg(test)]
+#[path = "join/tests.rs"]
+mod tests;
+
+#[cfg(test)]
+#[path = "join/table_tests.rs"]
+mod table_tests;
+
+#[cfg(test)]
+#[path = "join/clock_tests.rs"]
+mod clock_tests;
+
+#[cfg(test)]
+#[path = "join/hostile_tests.rs"]
+mod hostile_tests;
+
+#[cfg(test)]
+#[path = "join/loss_tests.rs"]
+mod loss_tests;
