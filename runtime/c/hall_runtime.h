@@ -265,19 +265,19 @@ typedef struct {
 
 // A and L of a stage: q' = q + A a + L v.
 typedef struct {
-  // A: rows X, Y, Rz in m, m, rad per m/s2, m/s2, rad/s2 of acceleration.
-  float acceleration_s2[3][3];
-  // L: rows X, Y, Rz in m, m, rad per m/s, m/s, rad/s of velocity.
+  // A: rows X, Y, Rz in m, m, rad per m/s2 or rad/s2 of the acceleration of X, Y, Rz, Z, Rx, Ry.
+  float acceleration_s2[3][6];
+  // L: rows X, Y, Rz in m, m, rad per m/s or rad/s of the velocity of X, Y, Rz.
   float velocity_s[3][3];
 } HallMotionCorrection;
 
-// Commanded velocity and acceleration of X, Y, Rz at the instant of a pose.
+// Commanded velocity and acceleration at the instant of a pose.
 typedef struct {
   // Of X, Y, Rz: m/s, m/s, rad/s.
   float velocity[3];
-  // Of X, Y, Rz: m/s2, m/s2, rad/s2.
-  float acceleration[3];
-} HallPlanarMotion;
+  // Of X, Y, Rz, Z, Rx, Ry: m/s2, m/s2, rad/s2, m/s2, rad/s2, rad/s2.
+  float acceleration[6];
+} HallCommandedMotion;
 
 #ifdef __cplusplus
 extern "C" {
@@ -377,7 +377,7 @@ HallResult hall_load_motion_correction(const uint8_t *memory,
 HALL_NODISCARD
 bool hall_correct_motion(const HallMotionCorrection *correction,
                          HallPlanarPose pose,
-                         const HallPlanarMotion *commanded,
+                         const HallCommandedMotion *commanded,
                          HallPlanarPose *corrected);
 
 #ifdef __cplusplus

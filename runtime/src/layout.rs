@@ -139,9 +139,8 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         velocity_s,
     }) = motion_correction
     {
-        for matrix in [acceleration_s2, velocity_s] {
-            visit("the motion correction", matrix.as_flattened_mut());
-        }
+        visit("the motion correction", acceleration_s2.as_flattened_mut());
+        visit("the motion correction", velocity_s.as_flattened_mut());
     }
 }
 

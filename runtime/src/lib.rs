@@ -91,7 +91,7 @@ pub use calibration::Calibration;
 pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;
 pub use model::{FieldModel, LinearModel, Model, ModelKind};
-pub use motion::{MotionCorrection, PlanarMotion};
+pub use motion::{CommandedMotion, MotionCorrection};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use prediction::Predictor;

@@ -166,9 +166,9 @@ pub(crate) fn warm_parameters() -> ParameterSet {
 /// A and L as of a coil 5 cm from probe A, and of probes that are read up to 0.3 ms apart.
 pub(crate) const MOTION: MotionCorrection = MotionCorrection {
     acceleration_s2: [
-        [-6e-6, 2e-6, -3e-7],
-        [-3e-6, -1e-6, 2e-7],
-        [-1.5e-5, 5e-6, -8e-7],
+        [-6e-6, 2e-6, -3e-7, 4e-6, -7e-7, 6e-7],
+        [-3e-6, -1e-6, 2e-7, -2e-6, 9e-7, 5e-7],
+        [-1.5e-5, 5e-6, -8e-7, 8e-6, 1e-6, -2e-6],
     ],
     velocity_s: [
         [1e-4, 2.5e-4, 9e-5],

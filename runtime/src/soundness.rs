@@ -109,10 +109,9 @@ impl ParameterSet {
         let Some(motion) = &self.motion_correction else {
             return Ok(());
         };
-        let large =
-            |matrix: &[[f32; 3]; 3], most| matrix.as_flattened().iter().any(|x| x.abs() > most);
-        if large(&motion.acceleration_s2, ACCELERATION_MAX)
-            || large(&motion.velocity_s, VELOCITY_MAX)
+        let large = |matrix: &[f32], most| matrix.iter().any(|x| x.abs() > most);
+        if large(motion.acceleration_s2.as_flattened(), ACCELERATION_MAX)
+            || large(motion.velocity_s.as_flattened(), VELOCITY_MAX)
         {
             return Err(ParameterError::LargeMotionCorrection);
         }

@@ -53,7 +53,7 @@ fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
     ];
     let of_motion: [(&str, ChangeTo); 2] = [
         ("the motion correction", |s, x| {
-            motion(s).acceleration_s2[2][0] = x
+            motion(s).acceleration_s2[2][5] = x
         }),
         ("the motion correction", |s, x| {
             motion(s).velocity_s[1][2] = x
@@ -133,7 +133,7 @@ fn motion(set: &mut ParameterSet) -> &mut crate::MotionCorrection {
 #[test]
 fn a_motion_correction_in_another_unit_is_refused() {
     let changes: [ChangeTo; 2] = [
-        |set, unit| motion(set).acceleration_s2[0][0] *= 1e6 * unit,
+        |set, unit| motion(set).acceleration_s2[0][3] *= 1e6 * unit,
         |set, unit| motion(set).velocity_s[1][1] *= 1e3 * unit,
     ];
     for change in changes {

@@ -9,7 +9,7 @@
 static HallDecoder decoder;
 static HallServo servo;
 static HallMotionCorrection correction;
-static uint8_t blob[728];
+static uint8_t blob[764];
 static uint32_t frames[256][9];
 static HallReading readings[256];
 
@@ -35,11 +35,12 @@ static float number(int32_t code, uint32_t sequence)
 
 static void correct(HallReading *reading, const HallFrame *frame)
 {
-    HallPlanarMotion commanded;
+    HallCommandedMotion commanded;
     HallPlanarPose pose = { reading->x_m, reading->y_m, reading->rz_rad };
     for (int k = 0; k < 3; k++) {
         commanded.velocity[k] = number(frame->hall[k], frame->sequence);
         commanded.acceleration[k] = number(frame->capacitive[k], frame->sequence);
+        commanded.acceleration[3 + k] = number(frame->hall[(k + 1) % 3], frame->sequence);
     }
     (void)!hall_correct_motion(&correction, pose, &commanded, &pose);
     reading->x_m = pose.x_m;

@@ -72,7 +72,7 @@ static int corrects(void)
 {
     const size_t length = (size_t)_parameter_slot_bytes;
     HallMotionCorrection correction = { { { 1 } }, { { 1 } } };
-    HallPlanarMotion commanded = { { 0 }, { 2, 0, 0 } };
+    HallCommandedMotion commanded = { { 0 }, { 0, 0, 0, 0, 0, 2 } };
     HallPlanarPose pose = { 1e-6f, 2e-6f, 3e-6f }, corrected;
     const HallPlanarPose none = { 0, 0, 0 };
     CHECK(hall_load_motion_correction(_parameter_slot_0, 100, &correction) == HALL_RESULT_TRUNCATED);
@@ -83,7 +83,7 @@ static int corrects(void)
     CHECK(hall_load_motion_correction(_parameter_slot_0, length, &correction) == HALL_RESULT_OK);
     CHECK(hall_correct_motion(&correction, pose, &commanded, &corrected));
     CHECK(memcmp(&pose, &corrected, sizeof pose) == 0);
-    correction.acceleration_s2[2][0] = 1e-5f;
+    correction.acceleration_s2[2][5] = 1e-5f;
     CHECK(hall_correct_motion(&correction, pose, &commanded, &corrected));
     CHECK(corrected.rz_rad == 3e-6f + 1e-5f * 2 && corrected.x_m == pose.x_m);
     CHECK(!hall_correct_motion(NULL, pose, &commanded, &corrected));

@@ -17,7 +17,7 @@ mod run;
 
 pub use run::{Stop, Transfer, run};
 
-use runtime::{OnInvalid, PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading};
+use runtime::{CommandedMotion, OnInvalid, PlanarPose, PoseTracker, Predictor, RawFrame, Reading};
 
 /// Source: a parameter blob.
 pub const BLOB: u32 = 2;
@@ -113,14 +113,17 @@ impl PredictingTracker {
 }
 
 /// A commanded motion made of a frame's codes: up to 3 m/s, m/s2, and in one tick of 64 any words.
-pub fn motion(frame: &RawFrame) -> PlanarMotion {
+pub fn motion(frame: &RawFrame) -> CommandedMotion {
     let number = |code: i32| match frame.sequence % 64 {
         0 => f32::from_bits((code as u32) << 16),
         _ => code as f32 * 1e-4,
     };
-    PlanarMotion {
-        velocity: frame.hall.map(number),
-        acceleration: frame.capacitive.map(number),
+    let velocity = frame.hall.map(number);
+    let [vx, vy, vrz] = velocity;
+    let [x, y, rz] = frame.capacitive.map(number);
+    CommandedMotion {
+        velocity,
+        acceleration: [x, y, rz, vy, vrz, vx],
     }
 }
 

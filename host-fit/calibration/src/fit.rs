@@ -118,7 +118,7 @@ impl Fit {
         let made = calibration(sound, stage, model.kind, &estimate.parameters);
         let calibration = Calibration {
             temperature: estimate.temperature,
-            motion_correction: estimate.motion_correction(),
+            motion_correction: estimate.motion.correction(&estimate.parameters),
             ..made.map_err(FitError::Unusable)?
         };
         let origin = Origin {
@@ -150,7 +150,7 @@ impl Fit {
     #[must_use]
     pub fn with_motion(mut self, motion: &MotionFit) -> Self {
         self.estimate.motion = *motion;
-        self.calibration.motion_correction = self.estimate.motion_correction();
+        self.calibration.motion_correction = motion.correction(&self.estimate.parameters);
         self.set.motion_correction = self.calibration.motion_correction;
         self
     }

@@ -77,8 +77,8 @@ impl Decoder {
     /// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
     /// shows as missed frames.
     ///
-    /// `velocity`, `acceleration`: commanded motion of X, Y, Rz at each row, (n, 3), m/s, m/s, rad/s and m/s2, m/s2,
-    /// rad/s2, in the frame of the pose. The motion correction of the parameters then takes off the errors that
+    /// `velocity`, `acceleration`: commanded motion at each row, of X, Y, Rz, (n, 3), m/s, m/s, rad/s, and of X, Y, Rz, Z, Rx,
+    /// Ry, (n, 6), m/s2 and rad/s2, in the frame of the pose. The motion correction of the parameters then takes off the errors that
     /// follow motion. Both come from the trajectory, for the sample of the row. A held pose is the last corrected one.
     ///
     /// Raises `ValueError` with the name of an argument of wrong shape or dtype, of a motion without the other, and of one

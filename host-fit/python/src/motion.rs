@@ -5,7 +5,7 @@ use crate::decoder::WORDS;
 use crate::error::wrong;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
-use runtime::{MotionCorrection, PlanarMotion, PlanarPose, Status};
+use runtime::{CommandedMotion, MotionCorrection, PlanarPose, Status};
 
 /// The motion commanded at each row, and the correction of a blob.
 pub struct Commanded<'py> {
@@ -32,7 +32,7 @@ impl<'py> Commanded<'py> {
         Ok(Some(Self {
             correction,
             velocity: table("velocity", velocity, 3)?,
-            acceleration: table("acceleration", acceleration, 3)?,
+            acceleration: table("acceleration", acceleration, 6)?,
         }))
     }
 
@@ -40,7 +40,7 @@ impl<'py> Commanded<'py> {
     pub fn correct(&self, words: &mut [u32], of: &str) -> PyResult<()> {
         let (rows, _) = words.as_chunks_mut::<WORDS>();
         let (velocity, _) = slice(self.velocity.as_slice())?.as_chunks::<3>();
-        let (acceleration, _) = slice(self.acceleration.as_slice())?.as_chunks::<3>();
+        let (acceleration, _) = slice(self.acceleration.as_slice())?.as_chunks::<6>();
         same_rows("velocity", velocity.len(), of, rows.len())?;
         same_rows("acceleration", acceleration.len(), of, rows.len())?;
         let mut last = [0; 3];
@@ -54,7 +54,7 @@ impl<'py> Commanded<'py> {
                 }
                 continue;
             }
-            let commanded = PlanarMotion {
+            let commanded = CommandedMotion {
                 velocity: v.map(|v| v as f32),
                 acceleration: a.map(|a| a as f32),
             };

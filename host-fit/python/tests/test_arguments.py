@@ -56,7 +56,7 @@ def calls(
     }  # fmt: skip
     decode = {
         "log": None, "hall": hall, "caps": caps, "mount": np.zeros(ROWS), "body": np.zeros(ROWS),
-        "velocity": np.zeros((ROWS, 3)), "acceleration": np.zeros((ROWS, 3)), "hold": 2,
+        "velocity": np.zeros((ROWS, 3)), "acceleration": np.zeros((ROWS, 6)), "hold": 2,
     }  # fmt: skip
     return [
         (hs.Stage.load, {"path": DATA / "stage.toml"}),

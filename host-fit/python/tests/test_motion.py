@@ -25,12 +25,12 @@ def fast(coils: Path, stage: hs.Stage) -> hs.Log:
 def commanded(coils: Path, fast: hs.Log) -> dict[str, Any]:
     """The motion of the true poses."""
     truth = np.genfromtxt(coils / "truth.csv", delimiter=",", names=True)
-    pose = np.stack([truth[name] for name in ["x_nm", "y_nm", "rz_nrad"]], axis=1) * 1e-9
-    motion = {name: np.zeros_like(pose) for name in ["velocity", "acceleration"]}
+    pose = np.stack([truth[name] for name in "x_nm y_nm rz_nrad z_nm rx_nrad ry_nrad".split()], axis=1) * 1e-9
+    velocity, acceleration = np.zeros_like(pose), np.zeros_like(pose)
     for rows in np.split(np.arange(len(pose)), np.flatnonzero(np.diff(fast.movement)) + 1):
-        motion["velocity"][rows] = np.gradient(pose[rows], 0.002, axis=0)
-        motion["acceleration"][rows] = np.gradient(motion["velocity"][rows], 0.002, axis=0)
-    return motion
+        velocity[rows] = np.gradient(pose[rows], 0.002, axis=0)
+        acceleration[rows] = np.gradient(velocity[rows], 0.002, axis=0)
+    return {"velocity": velocity[:, :3], "acceleration": acceleration}
 
 
 def test_a_fit_shows_lags_and_accelerations_with_their_errors(in_motion: hs.Calibration) -> None:
@@ -63,8 +63,8 @@ def test_the_correction_is_that_of_the_controller_bit_for_bit(
     dec = in_motion.decoder()
     wanted = planar(dec(fast))
     for matrix, motion in [("acceleration_s2", "acceleration"), ("velocity_s", "velocity")]:
-        for k in range(3):
-            wanted += np.array(of[matrix], "f4")[:, k] * commanded[motion][:, k : k + 1].astype("f4")
+        for column, by in zip(np.array(of[matrix], "f4").T, commanded[motion].T.astype("f4"), strict=True):
+            wanted += column * by[:, None]
     assert wanted.dtype == np.float32
     corrected = dec(fast, **commanded)
     assert np.array_equal(planar(corrected).view("u4"), wanted.view("u4"))
@@ -94,7 +94,7 @@ def test_decode_corrects_a_log_with_its_trajectory_as_well_as_the_decoder_does(
 def test_a_held_pose_is_the_last_corrected_one(in_motion: hs.Calibration, fast: hs.Log) -> None:
     dec, hall = in_motion.decoder(), fast.hall[:9].copy()
     hall[5:8, 0] = 32767
-    motion = {"velocity": np.zeros((9, 3)), "acceleration": np.linspace(1, 2, 27).reshape(9, 3)}
+    motion = {"velocity": np.zeros((9, 3)), "acceleration": np.linspace(1, 2, 54).reshape(9, 6)}
     assert fast.caps is not None
     zero, held = (planar(dec(hall=hall, caps=fast.caps[:9], **motion, hold=hold)) for hold in [0, 2])  # type: ignore[arg-type]
     assert np.all(zero[5:8] == 0) and np.all(held[5:7] == zero[4]) and np.all(held[7] == 0)
@@ -106,12 +106,13 @@ def test_a_motion_that_cannot_be_used_is_named(
 ) -> None:
     v, a = commanded["velocity"], commanded["acceleration"]
     endless = a.copy()
-    endless[7, 2] = np.inf
+    endless[7, 5] = np.inf
     cases: list[tuple[dict[str, Any], str]] = [
         ({"velocity": v}, "acceleration: is missing"), ({"acceleration": a}, "velocity: is missing"),
         ({"velocity": v[:5], "acceleration": a}, "velocity: 5 rows, but log has"),
         ({"velocity": v, "acceleration": a[:5]}, "acceleration: 5 rows, but log has"),
         ({"velocity": v[:, :2], "acceleration": a}, "velocity: shape"),
+        ({"velocity": v, "acceleration": a[:, :3]}, "acceleration: shape"),
         ({"velocity": v, "acceleration": endless}, "acceleration: row 7: not finite"),
     ]  # fmt: skip
     for wrong, words in cases:

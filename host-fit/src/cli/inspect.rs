@@ -99,10 +99,15 @@ fn matrices(set: &ParameterSet) -> Vec<Table> {
         all.push(matrix("temperature", PROBES, ["k, 1/K", "h, 1/K"], &per_k));
     }
     if let Some(motion) = &set.motion_correction {
-        let (a, v) = (
-            ["X, m/s2", "Y, m/s2", "Rz, rad/s2"],
-            ["X, m/s", "Y, m/s", "Rz, rad/s"],
-        );
+        let a = [
+            "X, m/s2",
+            "Y, m/s2",
+            "Rz, rad/s2",
+            "Z, m/s2",
+            "Rx, rad/s2",
+            "Ry, rad/s2",
+        ];
+        let v = ["X, m/s", "Y, m/s", "Rz, rad/s"];
         all.push(matrix(
             "correction by acceleration",
             PLANAR,

@@ -104,29 +104,32 @@ pub fn temperature_parameters_in(set: &ParameterSet) -> BTreeMap<String, Paramet
 
 /// A and L of the motion correction, where a blob has one, by name.
 pub fn motion_parameters_in(set: &ParameterSet) -> Vec<(String, Parameter)> {
-    let motion = set.motion_correction.iter();
-    let matrices = motion.flat_map(|motion| {
-        [
-            ("A", motion.acceleration_s2, ["s2", "m s2", "s2/m"]),
-            ("L", motion.velocity_s, ["s", "m s", "s/m"]),
-        ]
-    });
+    let Some(motion) = &set.motion_correction else {
+        return Vec::new();
+    };
     let mut all = Vec::new();
-    for (letter, matrix, [unit, by_rz, of_rz]) in matrices {
-        for (k, &value) in matrix.as_flattened().iter().enumerate() {
-            let (row, column) = (&AXES[k / 3], &AXES[k % 3]);
+    let mut add = |letter: &str, numbers: &[f32], [unit, by_angle, of_angle]: [&'static str; 3]| {
+        for (k, &value) in numbers.iter().enumerate() {
+            let columns = numbers.len() / 3;
+            let (row, column) = (&AXES[k / columns], &AXES[k % columns]);
             let parameter = Parameter {
                 value: value.into(),
-                unit: match (row.key == "rz", column.key == "rz") {
-                    (true, false) => of_rz,
-                    (false, true) => by_rz,
+                unit: match (row.unit, column.unit) {
+                    ("rad", "m") => of_angle,
+                    ("m", "rad") => by_angle,
                     _ => unit,
                 },
                 standard_error: None,
             };
             all.push((format!("{letter}_{}_{}", row.key, column.key), parameter));
         }
-    }
+    };
+    let (a, l) = (
+        motion.acceleration_s2.as_flattened(),
+        motion.velocity_s.as_flattened(),
+    );
+    add("A", a, ["s2", "m s2", "s2/m"]);
+    add("L", l, ["s", "m s", "s/m"]);
     all
 }
 

@@ -15,7 +15,7 @@ use core::mem::MaybeUninit;
 use runtime::tracker::Health;
 use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{
-    AnyDecoder, BlobError, MotionCorrection, OnInvalid, ParameterSet, PlanarMotion, PoseTracker,
+    AnyDecoder, BlobError, MotionCorrection, OnInvalid, ParameterSet, CommandedMotion, PoseTracker,
     Predictor, RawFrame, Reading,
 };
 pub use storage::{HallDecoder, HallPredictor, HallServo};
@@ -269,7 +269,7 @@ pub unsafe extern "C" fn hall_load_motion_correction(
 pub extern "C" fn hall_correct_motion(
     correction: Option<&MotionCorrection>,
     pose: HallPlanarPose,
-    commanded: Option<&PlanarMotion>,
+    commanded: Option<&CommandedMotion>,
     corrected: Option<&mut MaybeUninit<HallPlanarPose>>,
 ) -> bool {
     let Some(corrected) = corrected else {

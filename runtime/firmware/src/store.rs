@@ -4,11 +4,11 @@
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
-//! | 0 | 728 | the blob, filled up with 0xFF |
-//! | 728 | 4 | sequence number, 1 to 2^32 - 2 |
-//! | 732 | 4 | CRC-32C (Castagnoli) of the 732 bytes before it |
-//! | 736 | 4 | commit word `COMT`; 0: never to be committed |
-//! | 740 | 4 | `SEAL`: the commit word was programmed to the end |
+//! | 0 | 764 | the blob, filled up with 0xFF |
+//! | 764 | 4 | sequence number, 1 to 2^32 - 2 |
+//! | 768 | 4 | CRC-32C (Castagnoli) of the 768 bytes before it |
+//! | 772 | 4 | commit word `COMT`; 0: never to be committed |
+//! | 776 | 4 | `SEAL`: the commit word was programmed to the end |
 //!
 //! A blob that a probe flashes has none of the four words, and the sequence number 0. The blob with the highest
 //! number is the newest; a probe's blob in slot 0 comes before one in slot 1.

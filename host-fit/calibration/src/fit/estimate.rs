@@ -5,8 +5,7 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
 use hallstage_solver::solve::Stopped;
-use runtime::matrix::to_rows;
-use runtime::{MotionCorrection, Temperature};
+use runtime::Temperature;
 use std::time::Duration;
 
 /// Parameters with their posterior. All other figures of a [`Fit`](super::Fit) follow from these.
@@ -31,17 +30,4 @@ pub struct Estimate {
     pub elapsed: Duration,
     /// Why the solver stopped.
     pub stopped: Stopped,
-}
-
-impl Estimate {
-    /// The correction by commanded speed and acceleration; `None` unless the log determines what acceleration adds.
-    pub fn motion_correction(&self) -> Option<MotionCorrection> {
-        let found = self.motion.correction(&self.parameters);
-        let [acceleration, velocity] = found.filter(|_| self.motion.shows_acceleration)?;
-        let rows = |m| to_rows(m).map(|row| row.map(|x| x as f32));
-        Some(MotionCorrection {
-            acceleration_s2: rows(&acceleration),
-            velocity_s: rows(&velocity),
-        })
-    }
 }

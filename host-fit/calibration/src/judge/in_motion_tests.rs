@@ -12,7 +12,8 @@ use hallstage_input::stage::Stage;
 use hallstage_simulate::dynamics::MotionEffects;
 use hallstage_simulate::protocol::{Protocol, Run};
 use hallstage_simulate::recording::record_stage;
-use hallstage_solver::estimator::rows::planar_motion;
+use hallstage_solver::estimator::rows::measured_motion;
+use runtime::CommandedMotion;
 
 const SEED: u64 = 7;
 
@@ -40,14 +41,16 @@ fn calibrated(dynamics: MotionEffects) -> (Stage, Fit, Diagnosis, Dataset) {
     };
     let run = log(two_tones(&stage));
     let fast = log(Protocol::Fast.run(period_s, SEED));
-    let motion = planar_motion(&fast, &vec![true; fast.rows.len()]);
-    let rms = |derivative: usize, axis: usize| {
-        let squares = motion.iter().map(|row| row[derivative][axis].powi(2));
+    let motion = measured_motion(&fast, &vec![true; fast.rows.len()]);
+    let rms = |of: &dyn Fn(&CommandedMotion) -> f32| {
+        let squares = motion.iter().map(|row| f64::from(of(row)).powi(2));
         (squares.sum::<f64>() / motion.len() as f64).sqrt()
     };
-    for (axis, motion) in stage.motion.axes.iter_mut().enumerate().take(3) {
-        motion.service_speed_rms = rms(0, axis);
-        motion.service_acceleration_rms = rms(1, axis);
+    for (axis, motion) in stage.motion.axes.iter_mut().enumerate() {
+        motion.service_acceleration_rms = rms(&|row| row.acceleration[axis]);
+        if axis < 3 {
+            motion.service_speed_rms = rms(&|row| row.velocity[axis]);
+        }
     }
     let fitted = fit(&run, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
     let diagnosis = diagnose_log(&run, &stage, Ok(&fitted));
@@ -65,7 +68,7 @@ fn errors(stage: &Stage, fit: &Fit, fast: &Dataset) -> [[f64; 3]; 2] {
 }
 
 #[test]
-fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
+fn late_probes_arms_that_bend_and_coils_are_found_forecast_and_corrected() {
     let (stage, sound, diagnosis, fast) = calibrated(MotionEffects::NONE);
     let [corrected, floor] = errors(&stage, &sound, &fast);
     assert_eq!(diagnosis.verdict, Some(Verdict::Good));
@@ -73,8 +76,11 @@ fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
         let cost = corrected[axis] / floor[axis];
         assert!((0.99..1.005).contains(&cost), "{axis}: {cost}");
     }
-    for lags_s in [[3e-4, -3e-4, 0.0], [0.0; 3]] {
-        let dynamics = MotionEffects::draw(lags_s, None, Some(120.0), SEED);
+    for (lags_s, coil_m, arm_hz) in [
+        ([3e-4, -3e-4, 0.0], None, Some(120.0)),
+        ([0.0; 3], Some(0.05), None),
+    ] {
+        let dynamics = MotionEffects::draw(lags_s, coil_m, arm_hz, SEED);
         let (stage, bent, diagnosis, fast) = calibrated(dynamics);
         for (found_s, lag_s) in bent.estimate.motion.dynamics.probe_lag_s.iter().zip(lags_s) {
             assert!((found_s - lag_s).abs() < 10e-6, "{found_s} {lag_s}");
@@ -91,6 +97,8 @@ fn late_probes_and_arms_that_bend_are_found_forecast_and_corrected() {
             );
             assert!(left < 1.03, "{axis}: {left}");
         }
+        let expected = diagnosis.motion.expect("figures").corrected_ratio;
+        assert!((0.99..1.03).contains(&expected), "{expected}");
         let correction = bent.set.motion_correction.expect("a correction");
         let row = fast.rows.len() / 2;
         let mut spiked = fast.clone();

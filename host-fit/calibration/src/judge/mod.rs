@@ -33,7 +33,7 @@ use hallstage_input::statistics::median;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::robust::{HALF, Loss};
-use hallstage_solver::estimator::rows::planar_motion;
+use hallstage_solver::estimator::rows::measured_motion;
 use hallstage_solver::estimator::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::{AnyDecoder, MotionCorrection, ParameterSet, PlanarPose};
@@ -90,18 +90,15 @@ impl Decoded {
         }
     }
 
-    /// With poses corrected by the speed and the acceleration of the reference.
+    /// With poses corrected by speed and acceleration of the reference and the gaps.
     #[must_use]
     pub fn corrected(&self, correction: &MotionCorrection, dataset: &Dataset) -> Self {
         let mut corrected = self.clone();
-        let motion = planar_motion(dataset, &self.trusted(dataset)).into_iter();
-        for (error, [speed, acceleration]) in corrected.errors.iter_mut().zip(motion) {
-            for (axis, error) in error.iter_mut().flatten().enumerate() {
-                for k in 0..3 {
-                    *error += f64::from(correction.velocity_s[axis][k]) * speed[k];
-                    *error += f64::from(correction.acceleration_s2[axis][k]) * acceleration[k];
-                }
-            }
+        let motion = measured_motion(dataset, &self.trusted(dataset));
+        for (error, motion) in corrected.errors.iter_mut().zip(&motion) {
+            let found = error.map(|error| PlanarPose::from_array(error.map(|x| x as f32)));
+            let less = found.and_then(|found| correction.correct(found, motion));
+            *error = less.map(|pose| pose.to_array().map(f64::from));
         }
         corrected
     }

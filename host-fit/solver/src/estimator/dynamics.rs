@@ -9,7 +9,9 @@ use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::whiten::{ACCELERATIONS, LAG, PROBE_LAGS};
 use nalgebra::{Cholesky, Const, DMatrix, Matrix2, Matrix3, SMatrix, Vector3};
+use runtime::MotionCorrection;
 use runtime::matrix::{from_rows, inverse};
+use std::array::from_fn;
 
 /// Rotations count at this arm, m: an acceleration in rad/s2 times the arm is in m/s2.
 pub const ARM_M: f64 = 0.25;
@@ -42,8 +44,7 @@ impl Dynamics {
         Self {
             lag_s: values[LAG],
             probe_lag_s: [a, b, -a - b],
-            m_per_m_s2: [0, 1, 2]
-                .map(|probe| std::array::from_fn(|axis| values[column(probe, axis)])),
+            m_per_m_s2: [0, 1, 2].map(|probe| from_fn(|axis| values[column(probe, axis)])),
         }
     }
 
@@ -110,7 +111,7 @@ impl MotionFit {
             dynamics: Dynamics::from_values(values),
             probe_lag_covariance: three_lags(lags.into()),
             acceleration_covariance: match shows_acceleration {
-                true => std::array::from_fn(axis_covariance),
+                true => from_fn(axis_covariance),
                 false => Self::unknown().acceleration_covariance,
             },
             shows_acceleration,
@@ -133,7 +134,7 @@ impl MotionFit {
     pub fn acceleration_errors(&self) -> [[f64; 6]; 3] {
         [0, 1, 2].map(|probe| {
             let variance = |axis: usize| self.acceleration_covariance[axis][(probe, probe)];
-            std::array::from_fn(|axis| variance(axis).sqrt())
+            from_fn(|axis| variance(axis).sqrt())
         })
     }
 
@@ -161,19 +162,22 @@ impl MotionFit {
         self.dynamics.probe_lag_s.map(|lag_s| lag_s - sorted[1])
     }
 
-    /// The matrices of the correction, X, Y, Rz in m, m, rad: -G k by the acceleration of X, Y, Rz (s2) and L by their
-    /// speed (s). `None` where the probes do not determine the pose.
-    pub fn correction(&self, parameters: &FieldParameters) -> Option<[Matrix3<f64>; 2]> {
-        let (readings, poses) = jacobian(parameters)?;
-        let k =
-            Matrix3::from_fn(|probe, axis| self.dynamics.m_per_m_s2[probe][axis] * ARMS_M[axis]);
+    /// The correction by commanded speed and acceleration: -G k and L. `None` unless the log shows what acceleration
+    /// adds, and where the probes do not determine the pose.
+    pub fn correction(&self, parameters: &FieldParameters) -> Option<MotionCorrection> {
+        let (readings, poses) = jacobian(parameters).filter(|_| self.shows_acceleration)?;
+        let k = |probe: usize, axis: usize| self.dynamics.m_per_m_s2[probe][axis] * ARMS_M[axis];
+        let by_acceleration = -poses * SMatrix::<f64, 3, 6>::from_fn(k);
         let lags = Matrix3::from_diagonal(&self.lags_behind_middle_s().into());
-        Some([-poses * k, poses * lags * readings])
+        let by_speed = poses * lags * readings;
+        Some(MotionCorrection {
+            acceleration_s2: from_fn(|row| from_fn(|axis| by_acceleration[(row, axis)] as f32)),
+            velocity_s: from_fn(|row| from_fn(|axis| by_speed[(row, axis)] as f32)),
+        })
     }
 
     /// Variances that motion adds to X, Y, Rz in service (m2, m2, rad2): speeds and accelerations of the axes are
-    /// independent. The correction leaves the errors of the fit, and what the acceleration of Z, Rx, Ry adds. `None` where
-    /// the probes do not determine the pose.
+    /// independent. The correction leaves the errors of the fit. `None` where the probes do not determine the pose.
     pub fn variance(
         &self,
         parameters: &FieldParameters,
@@ -181,25 +185,18 @@ impl MotionFit {
         is_corrected: bool,
     ) -> Option<[f64; 3]> {
         let (readings, poses) = jacobian(parameters)?;
+        let left = if is_corrected { 0.0 } else { 1.0 };
+        let second_moment = |covariance: Matrix3<f64>, known: [f64; 3]| {
+            let known = left * Vector3::from(known);
+            covariance + known * known.transpose()
+        };
         let mut sum = Matrix3::zeros();
         for (axis, acceleration) in motion.acceleration.into_iter().enumerate() {
             let known = self.dynamics.m_per_m_s2.map(|by| by[axis]);
-            let known = if is_corrected && axis < 3 {
-                [0.0; 3]
-            } else {
-                known
-            };
-            let known = Vector3::from(known);
-            let k = self.acceleration_covariance[axis] + known * known.transpose();
+            let k = second_moment(self.acceleration_covariance[axis], known);
             sum += poses * k * poses.transpose() * (ARMS_M[axis] * acceleration).powi(2);
         }
-        let known = if is_corrected {
-            [0.0; 3]
-        } else {
-            self.lags_behind_middle_s()
-        };
-        let known = Vector3::from(known);
-        let lags = self.probe_lag_covariance + known * known.transpose();
+        let lags = second_moment(self.probe_lag_covariance, self.lags_behind_middle_s());
         for (axis, speed) in motion.speed.into_iter().enumerate() {
             // J^-1 diag(J v): what a lag of each probe does to the pose.
             let by_lag = poses * Matrix3::from_diagonal(&readings.column(axis).into_owned());

@@ -10,6 +10,7 @@ use crate::estimator::robust::HALF;
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::stage;
 use rayon::prelude::*;
+use runtime::CommandedMotion;
 use std::ops::Range;
 
 /// Most rows of a block.
@@ -294,12 +295,14 @@ fn acceleration(dataset: &Dataset, index: usize, trusted: &[bool]) -> [f64; 6] {
     second_derivatives(used.map(sample)).unwrap_or([0.0; 6])
 }
 
-/// Speed and acceleration of X, Y, Rz by the reference at each row of a dataset, SI. Only the `trusted` rows count.
-pub fn planar_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<[[f64; 3]; 2]> {
+/// The motion by the reference and the gaps at each row of a dataset. Only the `trusted` rows count.
+pub fn measured_motion(dataset: &Dataset, trusted: &[bool]) -> Vec<CommandedMotion> {
     let at = |index: usize| {
         let [x, y, rz, ..] = speed(dataset, index, trusted);
-        let [by_x, by_y, by_rz, ..] = acceleration(dataset, index, trusted);
-        [[x, y, rz], [by_x, by_y, by_rz]]
+        CommandedMotion {
+            velocity: [x, y, rz].map(|x| x as f32),
+            acceleration: acceleration(dataset, index, trusted).map(|x| x as f32),
+        }
     };
     (0..dataset.rows.len()).into_par_iter().map(at).collect()
 }

@@ -1,11 +1,11 @@
-//! Poses corrected by the motion that their log commands.
+//! Poses corrected by the motion that their log commands in X, Y, Rz and measures in Z, Rx, Ry.
 
 use super::PoseRow;
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::log::LogRow;
 use hallstage_solver::estimator::derivatives::SIDE_US;
-use hallstage_solver::estimator::rows::planar_motion;
-use runtime::{MotionCorrection, PlanarMotion, PlanarPose, Status};
+use hallstage_solver::estimator::rows::measured_motion;
+use runtime::{MotionCorrection, PlanarPose, Status};
 
 /// Rows that are corrected at once.
 const PIECE_ROWS: usize = 8192;
@@ -53,16 +53,12 @@ impl<'a> Commanded<'a> {
             movements: vec![Movement { log, index, rows }],
             ..Dataset::default()
         };
-        let motion = planar_motion(&dataset, &vec![true; dataset.rows.len()]);
+        let motion = measured_motion(&dataset, &vec![true; dataset.rows.len()]);
         let mut poses: Vec<PoseRow> = self.poses.drain(..count).collect();
-        for (pose, [speed, acceleration]) in poses.iter_mut().zip(&motion[first..]) {
-            let commanded = PlanarMotion {
-                velocity: speed.map(|x| x as f32),
-                acceleration: acceleration.map(|x| x as f32),
-            };
+        for (pose, motion) in poses.iter_mut().zip(&motion[first..]) {
             let (status, planar) = (pose.reading.status, &mut pose.reading.pose.planar);
             if !status.any(Status::PLANAR_INVALID) {
-                self.last = (self.correction.correct(*planar, &commanded)).unwrap_or(*planar);
+                self.last = (self.correction.correct(*planar, motion)).unwrap_or(*planar);
             }
             if !status.any(Status::PLANAR_INVALID) || status.any(Status::PLANAR_HELD) {
                 *planar = self.last;

@@ -6,7 +6,7 @@
 use crc::{CRC_32_ISCSI, Crc};
 use libfuzzer_sys::fuzz_target;
 use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAX_BYTES};
-use runtime::{Decode, ParameterSet, PlanarMotion, PlanarPose, RawFrame};
+use runtime::{Decode, ParameterSet, CommandedMotion, PlanarPose, RawFrame};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
@@ -41,9 +41,9 @@ fuzz_target!(|data: &[u8]| {
         assert!(reading.planar().is_some() || q == [0.0; 3]);
         assert!(reading.vertical().is_some() || v == [0.0; 3]);
         if let Some(correction) = set.motion_correction {
-            let commanded = PlanarMotion {
+            let commanded = CommandedMotion {
                 velocity: [1.0, -1.0, 10.0],
-                acceleration: [-10.0, 10.0, 100.0],
+                acceleration: [-10.0, 10.0, 100.0, 10.0, -100.0, 100.0],
             };
             let corrected = correction.correct(reading.pose.planar, &commanded);
             assert!(corrected.is_some());

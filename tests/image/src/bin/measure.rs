@@ -17,8 +17,8 @@ use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::Decoder;
 use runtime::model::{FieldProbe, Sensitivity};
 use runtime::{
-    AnyDecoder, Decode, FieldModel, LinearModel, Model, MotionCorrection, OnInvalid, ParameterSet,
-    PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
+    AnyDecoder, CommandedMotion, Decode, FieldModel, LinearModel, Model, MotionCorrection,
+    OnInvalid, ParameterSet, PlanarPose, PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
 };
 
 const MODEL_31: &[u8] = include_bytes!("../../../../runtime/examples/stage.bin");
@@ -122,7 +122,7 @@ fn counted_prediction(
 fn counted_motion(
     correction: &MotionCorrection,
     pose: &PlanarPose<f32>,
-    commanded: &PlanarMotion,
+    commanded: &CommandedMotion,
     corrected: &mut Option<PlanarPose<f32>>,
 ) {
     *corrected = correction.correct(*pose, commanded);
@@ -309,14 +309,14 @@ fn main() -> ! {
         black_box(&pose);
         counted_field_tick(&field, &frame, &zero, &mut reading);
         black_box(&reading);
-        let mut three = || [(); 3].map(|()| words.next() as i32 as f32 * 1e-15);
+        let mut number = |_| words.next() as i32 as f32 * 1e-15;
         let correction = MotionCorrection {
-            acceleration_s2: [three(), three(), three()],
-            velocity_s: [three(), three(), three()],
+            acceleration_s2: [(); 3].map(|()| [0; 6].map(&mut number)),
+            velocity_s: [(); 3].map(|()| [0; 3].map(&mut number)),
         };
-        let commanded = PlanarMotion {
-            velocity: three(),
-            acceleration: three(),
+        let commanded = CommandedMotion {
+            velocity: [0; 3].map(&mut number),
+            acceleration: [0; 6].map(&mut number),
         };
         let mut corrected = None;
         counted_motion(&correction, &pose, &commanded, &mut corrected);

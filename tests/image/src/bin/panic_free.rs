@@ -15,8 +15,8 @@ use hal_adapters::can::{
 use runtime::blob::MAX_BYTES;
 use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{
-    OnInvalid, ParameterSet, PlanarMotion, PlanarPose, PoseTracker, Predictor, RawFrame, Reading,
-    VerticalPose,
+    CommandedMotion, OnInvalid, ParameterSet, PlanarPose, PoseTracker, Predictor, RawFrame,
+    Reading, VerticalPose,
 };
 
 extern crate image;
@@ -129,7 +129,7 @@ fn main() -> ! {
         predictor.take(&tracker, &frame, &reading);
         black_box(predictor.pose_at(black_box(2_300)));
         let correction = black_box(set.motion_correction.unwrap_or_default());
-        let commanded = black_box(PlanarMotion::default());
+        let commanded = black_box(CommandedMotion::default());
         black_box(correction.correct(reading.pose.planar, &commanded));
         black_box(tracker.tick_without_frame());
         black_box(tracker.tick_with(1, |zero| {
