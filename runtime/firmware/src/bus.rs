@@ -1,12 +1,13 @@
 //! The CAN controller: emptied by the tick, filled by the tick and by interrupt, never waited for.
 //!
-//! Frames that are out of date after their tick are taken back from the mailboxes, too. A frame on the wire is then
-//! completed or fails, but is not repeated; the outbox gives no further frame before its mailbox is empty.
+//! With each tick all frames are taken back from the mailboxes, too: most are out of date, and an answer must not hold back
+//! a pose. A frame on the wire is then completed or fails, but is not repeated; the outbox gives no further frame before
+//! its mailbox is empty.
 
 use crate::board;
 use crate::random::Random;
 use crate::wait::Stopwatch;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, StandardId};
 use firmware::node::Node;
 use firmware::outbox::Outbox;
 use firmware::schedule::TICKS_PER_S;
@@ -109,14 +110,8 @@ impl Bus {
         if !self.started {
             return;
         }
-        let mut aborts = 0;
-        for (k, mailbox) in self.pending() {
-            let id = StandardId::new(mailbox.tir().read().stid().bits());
-            let message = id.and_then(|id| Message::from_id(Id::Standard(id)));
-            if !message.is_some_and(Outbox::is_lasting) {
-                aborts |= ABORT << (8 * k);
-            }
-        }
+        // An answer goes again after the poses.
+        let aborts = self.pending().fold(0, |bits, k| bits | ABORT << (8 * k));
         // SAFETY: bits that the controller defines; zeros change nothing.
         self.can.tsr().write(|w| unsafe { w.bits(aborts) });
 
@@ -188,17 +183,15 @@ impl Bus {
                 return;
             };
             fill(mailbox, frame, self.node_bits);
-            self.outbox.pop();
+            self.outbox.filled();
             self.sent = self.sent.wrapping_add(1);
         }
     }
 
     /// The mailboxes that are not empty.
-    fn pending(&self) -> impl Iterator<Item = (u32, &TX)> {
+    fn pending(&self) -> impl Iterator<Item = u32> {
         let status = self.can.tsr().read().bits();
-        (0..)
-            .zip(self.can.tx_iter())
-            .filter(move |(k, _)| status & EMPTY << k == 0)
+        (0..3).filter(move |k| status & EMPTY << k == 0)
     }
 
     /// Notes which requests are completed, which ends their interrupt. Gives the empty mailboxes as
@@ -210,8 +203,7 @@ impl Bus {
             if status & REQUEST_COMPLETED << shift != 0 {
                 completed |= REQUEST_COMPLETED << shift;
                 // Only a request that was aborted ends without a frame.
-                let lost = status & SENT << shift == 0;
-                self.outbox.count_dropped(u32::from(lost));
+                self.outbox.completed(status & SENT << shift != 0);
             }
         }
         if completed != 0 {

@@ -97,7 +97,7 @@ mod app {
         let mut watchdog = Watchdog::start(device.IWDG, &device.DBGMCU, &mut stopwatch);
         // Before anything runs faster or is written.
         let supply = Supply::wait(device.PWR, &device.RCC, &mut watchdog, &mut stopwatch);
-        let (mut rcc, crystal) = start::clocks(&before, device.RCC, &mut stopwatch);
+        let (mut rcc, crystal) = start::clocks(&before, device.RCC, &mut watchdog, &mut stopwatch);
 
         watchdog.feed();
         fault::begin(Step::Peripherals);

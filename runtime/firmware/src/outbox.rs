@@ -15,12 +15,14 @@ const FRESH_MAX: usize = 11;
 const LASTING_MAX: usize = 8;
 
 /// A queue in two parts. The next tick discards and counts poses, codes, states and counters, which are then out of
-/// date. Answers are sent only once and wait as long as it takes.
+/// date. Answers are sent only once and wait as long as it takes: an answer that is taken back for a pose goes again.
 #[derive(Debug, Default)]
 pub struct Outbox {
     /// Frames of this tick; true: it may join the previous frame in the mailboxes.
     fresh: Deque<(Coded, bool), FRESH_MAX>,
     lasting: Deque<Coded, LASTING_MAX>,
+    /// Whether the first of them is in a mailbox.
+    answers: bool,
     dropped: u32,
 }
 
@@ -30,12 +32,13 @@ impl Outbox {
         Self {
             fresh: Deque::new(),
             lasting: Deque::new(),
+            answers: false,
             dropped: 0,
         }
     }
 
     /// Whether a frame is still worth sending after its tick.
-    pub const fn is_lasting(message: Message) -> bool {
+    const fn is_lasting(message: Message) -> bool {
         matches!(message, Message::Answer)
     }
 
@@ -59,24 +62,40 @@ impl Outbox {
         }
     }
 
-    /// The next frame for a mailbox, if one may be filled now; it stays until [`Self::pop`]. `all_empty`: no mailbox holds
+    /// The next frame for a mailbox, if one may be filled now; it stays until [`Self::filled`]. `all_empty`: no mailbox holds
     /// a frame.
     pub fn front(&self, all_empty: bool) -> Option<&Coded> {
         match self.fresh.front() {
             Some((frame, joins)) => (all_empty || *joins).then_some(frame),
-            None => self.lasting.front().filter(|_| all_empty),
+            None => self.lasting.front().filter(|_| all_empty && !self.answers),
         }
     }
 
     /// Whether no frame waits.
     pub fn is_empty(&self) -> bool {
-        self.front(true).is_none()
+        self.fresh.is_empty() && self.lasting.is_empty()
     }
 
-    /// Removes the frame that [`Self::front`] gave.
+    /// The frame that [`Self::front`] gave is in a mailbox.
+    pub fn filled(&mut self) {
+        self.answers = self.fresh.pop_front().is_none();
+    }
+
+    /// Takes the frame that [`Self::front`] gives to empty mailboxes, for a bus that always sends it.
     pub fn pop(&mut self) -> Option<Coded> {
-        let fresh = self.fresh.pop_front().map(|(frame, _)| frame);
-        fresh.or_else(|| self.lasting.pop_front())
+        let frame = self.front(true).copied()?;
+        self.filled();
+        self.completed(true);
+        Some(frame)
+    }
+
+    /// A mailbox has sent its frame, or given it up.
+    pub fn completed(&mut self, is_sent: bool) {
+        match (core::mem::take(&mut self.answers), is_sent) {
+            (true, true) => drop(self.lasting.pop_front()),
+            (true, false) => {}
+            (false, _) => self.count_dropped(u32::from(!is_sent)),
+        }
     }
 
     /// Discards the frames of the previous tick that are out of date.
@@ -90,8 +109,7 @@ impl Outbox {
         self.dropped
     }
 
-    /// Counts frames that a mailbox did not send.
-    pub const fn count_dropped(&mut self, frames: u32) {
+    const fn count_dropped(&mut self, frames: u32) {
         self.dropped = self.dropped.saturating_add(frames);
     }
 }
@@ -122,17 +140,27 @@ mod tests {
     }
 
     #[test]
-    fn answers_outlive_their_tick_and_let_the_next_pose_pass() {
+    fn an_answer_gives_way_to_the_next_pose_and_goes_again_until_it_is_sent() {
         let mut outbox = Outbox::new();
+        let next = |outbox: &mut Outbox, is_sent| {
+            let message = outbox.front(true).map(|frame| frame.message);
+            if message.is_some() {
+                outbox.filled();
+                assert_eq!(outbox.front(false), None);
+                outbox.completed(is_sent);
+            }
+            message
+        };
         for message in [Message::PoseX, Message::Answer, Message::NodeStatus] {
             outbox.push(frame(message));
         }
         outbox.start_tick();
-        assert_eq!(outbox.dropped(), 2);
+        assert_eq!(next(&mut outbox, false), Some(Message::Answer));
         outbox.push(frame(Message::PoseX));
-        let left: Vec<_> = core::iter::from_fn(|| outbox.pop())
-            .map(|frame| frame.message)
-            .collect();
-        assert_eq!(left, [Message::PoseX, Message::Answer]);
+        assert_eq!(next(&mut outbox, true), Some(Message::PoseX));
+        assert_eq!(next(&mut outbox, true), Some(Message::Answer));
+        assert_eq!(next(&mut outbox, true), None);
+        assert!(outbox.is_empty());
+        assert_eq!(outbox.dropped(), 2);
     }
 }

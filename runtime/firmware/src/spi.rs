@@ -50,8 +50,10 @@ impl SpiDma {
         let count = u16::try_from(words.len()).map_err(|_| ErrorKind::Other)?;
         let address = words.as_mut_ptr() as u32;
         let (spi, dma) = (&self.spi, &self.dma);
-        // A byte of an earlier transfer that was given up.
+        // Of an earlier transfer that was given up: a byte, and the overrun, which reads of both registers in this order
+        // clear (RM0090 rev. 18, section 28.3.10). Until then no byte is received.
         let _ = spi.dr().read();
+        let _ = spi.sr().read();
         spi.cr2().modify(|_, w| w.rxdmaen().set_bit());
         // SAFETY: bits that are cleared by writing 1.
         dma.lifcr().write(|w| unsafe { w.bits(ALL_FLAGS) });

@@ -6,6 +6,7 @@
 use crate::board::{self, INTERNAL_MHZ};
 use crate::fault;
 use crate::wait::Stopwatch;
+use crate::watchdog::Watchdog;
 use firmware::retained::Step;
 use firmware::start_up::{Before, Cause};
 use hal_adapters::can::status::{BoardFacts, bit, board_check};
@@ -13,9 +14,10 @@ use stm32f4xx_hal::pac::RCC;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 
-/// Longest time that the crystal may take, us: typically 2 ms (DS8626, HSE oscillator
-/// characteristics), and less than the shortest period of the watchdog.
-const CRYSTAL_US: u32 = 8000;
+/// Longest time that the crystal may take: typically 2 ms (DS8626, HSE oscillator characteristics), and 50 ms cold with much
+/// load. In steps of less than the shortest period of the watchdog.
+const CRYSTAL_STEPS: u32 = 10;
+const CRYSTAL_STEP_US: u32 = 5000;
 
 /// The brown-out level in FLASH_OPTCR: 0 is the highest, 2.7 V.
 const BROWN_OUT_LEVEL: u32 = 0b11 << 2;
@@ -38,13 +40,21 @@ pub fn before(rcc: &RCC) -> Before {
 
 /// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not start, the PLL did not lock
 /// to it, or it stopped. Returns whether the crystal runs.
-pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, bool) {
+pub fn clocks(
+    before: &Before,
+    rcc: RCC,
+    watchdog: &mut Watchdog,
+    stopwatch: &mut Stopwatch,
+) -> (Rcc, bool) {
     let failed = before.by_fault && before.record.fault.is_of_the_crystal();
     fault::begin(Step::Clocks);
     let crystal = !failed && {
         rcc.cr().modify(|_, w| w.hseon().set_bit());
         let ready = || rcc.cr().read().hserdy().bit_is_set();
-        stopwatch.until(INTERNAL_MHZ, CRYSTAL_US, ready)
+        (0..CRYSTAL_STEPS).any(|_| {
+            watchdog.feed();
+            stopwatch.until(INTERNAL_MHZ, CRYSTAL_STEP_US, ready)
+        })
     };
     if !crystal {
         rcc.cr().modify(|_, w| w.hseon().clear_bit());

@@ -77,6 +77,8 @@ pub struct CanModel {
     advanced_ns: u64,
     /// Until when other nodes hold the bus with frames of higher priority.
     busy_until_ns: u64,
+    /// Other nodes always send frames with this identifier.
+    pub others_send: Option<u16>,
     /// When it ceases to be bus-off; `None`: never.
     off_until: Option<Option<u64>>,
     mailboxes: [Mailbox; 3],
@@ -113,6 +115,7 @@ impl CanModel {
             latched: false,
             advanced_ns: 0,
             busy_until_ns: 0,
+            others_send: None,
             off_until: None,
             mailboxes: [Mailbox::default(); 3],
             done: 0,
@@ -238,19 +241,27 @@ impl CanModel {
         if self.on_the_wire.is_some() || !self.takes_part(now_ns) {
             return;
         }
-        let pending = (0..3).filter(|&k| self.mailboxes[k].pending);
-        let first = pending.min_by_key(|&k| self.mailboxes[k].registers[0] >> 3);
-        self.on_the_wire = first.map(|k| {
+        self.on_the_wire = self.first().map(|k| {
             let is_long = self.mailboxes[k].registers[0] & EXTENDED != 0;
             let takes_ns = if is_long { EXTENDED_FRAME_NS } else { FRAME_NS };
             (k, now_ns + takes_ns)
         });
     }
 
+    /// The pending frame of the highest priority, if other nodes let it pass.
+    fn first(&self) -> Option<usize> {
+        let pending = (0..3).filter(|&k| self.mailboxes[k].pending);
+        let first = pending.min_by_key(|&k| self.mailboxes[k].registers[0] >> 3)?;
+        let id = self.mailboxes[first].registers[0] >> 21;
+        (self.others_send)
+            .is_none_or(|other| id < other.into())
+            .then_some(first)
+    }
+
     /// When the next thing happens by itself.
     pub fn next_event_ns(&self) -> Option<u64> {
         let ends = self.on_the_wire.map(|(_, at)| at);
-        let waits = self.mailboxes.iter().any(|mailbox| mailbox.pending) && ends.is_none();
+        let waits = self.first().is_some() && ends.is_none();
         let joins = self.joins_ns.map(|at| at.max(self.busy_until_ns));
         let joins = joins.filter(|_| waits && self.off_until.is_none());
         let recovers = self.off_until.flatten();

@@ -1,8 +1,6 @@
 //! Oscillators, PLL and clock security, from RM0090 section 7 and DS8626; and the core's system
 //! timer, from PM0214.
 
-/// Start-up of a crystal: typically 2 ms (DS8626, table of the HSE oscillator).
-const CRYSTAL_START_NS: u64 = 2_000_000;
 /// Lock time of the PLL, at most (DS8626, table of the main PLL).
 const PLL_LOCK_NS: u64 = 300_000;
 
@@ -33,6 +31,8 @@ pub struct Clocks {
     hse_since: u64,
     /// When the PLL was switched on.
     pub pll_since: u64,
+    /// How long a crystal takes to start, ns; typically 2 ms (DS8626, table of the HSE oscillator).
+    pub crystal_start_ns: u64,
     /// Whether the crystal oscillates once it is switched on.
     pub crystal: bool,
     /// The PLL.
@@ -51,6 +51,7 @@ impl Clocks {
             cir: 0,
             hse_since: 0,
             pll_since: 0,
+            crystal_start_ns: 2_000_000,
             crystal,
             pll,
             timer: (0, 0, 0),
@@ -58,7 +59,7 @@ impl Clocks {
     }
 
     fn hse_ready(&self, now_ns: u64) -> bool {
-        self.crystal && self.cr & HSE_ON != 0 && now_ns >= self.hse_since + CRYSTAL_START_NS
+        self.crystal && self.cr & HSE_ON != 0 && now_ns >= self.hse_since + self.crystal_start_ns
     }
 
     fn pll_ready(&self, now_ns: u64) -> bool {

@@ -72,7 +72,7 @@ pub struct Peripherals {
     pub ram: Box<Memory<RAM_BYTES>>,
     /// By how much the second alarm comes late, ns.
     pub settled_jitter_ns: i64,
-    /// Whether no transfer by DMA starts.
+    /// Whether DMA takes no byte that comes over the SPI.
     pub dma_stands: bool,
     /// The CAN controller.
     pub can: CanModel,
@@ -126,6 +126,9 @@ pub struct Peripherals {
     captured_us: u32,
     dma: Dma,
     transfer: Option<Transfer>,
+    /// OVR of the SPI, and whether DR was read since the last transfer was asked for.
+    overrun: bool,
+    data_read: bool,
     selected: bool,
 }
 
@@ -178,6 +181,8 @@ impl Peripherals {
             captured_us: 0,
             dma: Dma::default(),
             transfer: None,
+            overrun: false,
+            data_read: false,
             selected: false,
         };
         new.reset(cause::POWER_ON);
@@ -200,6 +205,7 @@ impl Peripherals {
         self.starts = true;
         self.dma = Dma::default();
         self.transfer = None;
+        self.overrun = false;
         let fed = self.watchdog.fed;
         self.watchdog = Watchdog::new();
         self.watchdog.fed = fed;

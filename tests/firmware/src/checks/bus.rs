@@ -5,7 +5,8 @@ use super::start::{row, tick_now};
 use super::{no_resets, same_words};
 use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
-use hal_adapters::can::command::Request;
+use hal_adapters::can::Message;
+use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::flag;
 
 const MS: u64 = 1_000_000;
@@ -80,6 +81,21 @@ pub fn aborted_on_the_wire(bench: &Bench) {
         let dropped = Stage::read(&machine).count("frames_dropped") - dropped_before;
         assert!(dropped >= 2, "{dropped} frames dropped");
     }
+}
+
+/// An answer that other nodes do not let pass holds back no pose, and is sent once when they do.
+pub fn an_answer_waits_alone(bench: &Bench) {
+    let mut machine = bench.running(100);
+    machine.chip.can.others_send = Some(Message::Answer.spec().id - 1);
+    let (id, bytes) = command(Request::Identify { seconds: 1 }, 7, 7);
+    machine.chip.can.receive(id, bytes);
+    let held = Seen::after(&mut machine, 50);
+    same_words(&held.axes, &bench.poses, 0, 49);
+    assert_eq!(held.answers, []);
+    machine.chip.can.others_send = None;
+    let after = Seen::after(&mut machine, 50);
+    assert_eq!(after.outcomes(7), [Some(Outcome::Done)]);
+    same_words(&after.axes, &bench.poses, 0, 49);
 }
 
 /// More frames than the store holds: the overrun is counted once.

@@ -89,9 +89,16 @@ impl Peripherals {
         let is_on = word(SPI1) & SPI_ON != 0
             && word(SPI1 + 4) & SPI_REQUESTS == SPI_REQUESTS
             && word(AHB1ENR) & DMA2_BIT != 0
-            && !self.dma_stands
             && self.transfer.is_none();
         if !is_on {
+            return;
+        }
+        if self.dma_stands {
+            // Bytes are sent, and nobody takes what comes in their place.
+            self.overrun |= self.dma.serves(Request::Spi1Tx).is_some();
+            return;
+        }
+        if self.overrun {
             return;
         }
         let sides = (
@@ -207,8 +214,17 @@ impl Peripherals {
                 }
                 self.dma.read(o - DMA2)
             }
-            // Transmit buffer empty.
-            o if o == SPI1 + 0x08 => 2,
+            // Transmit buffer empty, and an overrun: a read of DR and then of SR clears it, and until then nothing is
+            // received (RM0090 rev. 18, section 28.3.10).
+            o if o == SPI1 + 0x08 => {
+                let state = 2 | u32::from(self.overrun) << 6;
+                self.overrun &= !self.data_read;
+                state
+            }
+            o if o == SPI1 + 0x0c => {
+                self.data_read = true;
+                word
+            }
             o if (CAN1..CAN1 + 0x400).contains(&o) => {
                 self.can.advance(self.now_ns);
                 self.can.read(o - CAN1, self.now_ns)
@@ -254,7 +270,10 @@ impl Peripherals {
                 self.dma.write(o - DMA2, value);
                 self.start_transfer();
             }
-            o if o == SPI1 + 4 => self.start_transfer(),
+            o if o == SPI1 + 4 => {
+                self.data_read = false;
+                self.start_transfer();
+            }
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
             }
