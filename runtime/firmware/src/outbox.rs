@@ -119,7 +119,6 @@ mod tests {
     extern crate std;
 
     use super::*;
-    use std::vec::Vec;
 
     const fn frame(message: Message) -> Coded {
         Coded {

@@ -26,7 +26,8 @@ const BROWN_OUT_LEVEL: u32 = 0b11 << 2;
 pub fn before(rcc: &RCC) -> Before {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    let cause = if flags.borrstf().bit_is_set() || flags.porrstf().bit_is_set() {
+    // A brown-out alone leaves PORRSTF clear (RM0090 rev. 18, section 7.3.21): RAM may have kept its record.
+    let cause = if flags.porrstf().bit_is_set() {
         Cause::PowerOn
     } else if flags.wdgrstf().bit_is_set() {
         Cause::Watchdog

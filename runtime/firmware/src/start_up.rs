@@ -15,7 +15,7 @@ pub enum Cause {
     PowerOn,
     /// The watchdog was not fed.
     Watchdog,
-    /// The program asked for it, or the pin did.
+    /// The program asked for it, the pin did, or the supply dropped for a moment.
     Reset,
 }
 

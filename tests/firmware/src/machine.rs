@@ -48,6 +48,8 @@ pub struct Machine {
     pub panics: u32,
     /// Times the power was lost in an operation of the flash.
     pub power_cuts: u32,
+    /// Whether such a cut is a brown-out, and RAM keeps its content.
+    pub cuts_are_short: bool,
     /// Delay of the next tick's interrupt, ns.
     pub hold_ns: u64,
     /// Whether a handler of faults left registers of the FPU to be stacked late, where the stack had
@@ -105,6 +107,7 @@ impl Machine {
             started: false,
             panics: 0,
             power_cuts: 0,
+            cuts_are_short: false,
             hold_ns: 0,
             lazy_left: false,
             watchdog_resets: 0,
@@ -140,6 +143,12 @@ impl Machine {
         self.reset(cause::POWER_ON);
     }
 
+    /// The supply drops for a moment: RAM keeps its content.
+    pub fn brown_out(&mut self) {
+        self.chip.flash.power_on();
+        self.reset(cause::BROWN_OUT);
+    }
+
     /// Pulls the pin NRST low.
     pub fn reset_by_pin(&mut self) {
         self.reset(cause::PIN);
@@ -154,7 +163,10 @@ impl Machine {
     fn reset_if_due(&mut self) -> bool {
         if self.chip.flash.sectors.is_off() {
             self.power_cuts += 1;
-            self.power_cycle();
+            match self.cuts_are_short {
+                true => self.brown_out(),
+                false => self.power_cycle(),
+            }
         } else if self.chip.watchdog_bites() {
             self.watchdog_resets += 1;
             self.reset(cause::WATCHDOG);

@@ -46,6 +46,8 @@ pub mod cause {
     pub const PIN: u32 = 1 << 26;
     /// Power-on, with the brown-out flag.
     pub const POWER_ON: u32 = 1 << 27 | 1 << 25 | PIN;
+    /// A supply that dropped below the brown-out level, and not so far that the power was gone.
+    pub const BROWN_OUT: u32 = 1 << 25 | PIN;
     /// The program.
     pub const SOFTWARE: u32 = 1 << 28 | PIN;
     /// The watchdog.

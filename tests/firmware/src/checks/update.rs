@@ -247,10 +247,23 @@ pub fn hardware_that_fails(bench: &Bench) {
 }
 
 /// Cuts of the power before, inside and after operations of the flash, and again in the start that follows:
-/// the old or the new blob runs, and for certain the new blob once the update was answered. Another update
-/// is possible.
+/// the old or the new blob runs, and for certain the new blob once the update was answered. After a brown-out the
+/// old blob runs. Another update is possible.
 pub fn power_cuts(bench: &Bench) {
     let operations = operations(bench);
+    for is_short in [false, true] {
+        let (old, new) = cut(bench, operations, is_short);
+        println!(
+            "RESULT firmware_{}={} old={old} new={new}",
+            ["power_cuts", "brown_outs"][usize::from(is_short)],
+            old + new
+        );
+        assert!(old > 0 && (new > 0) != is_short, "old {old}, new {new}");
+    }
+}
+
+/// How often the old and the new blob ran after cuts in these operations.
+fn cut(bench: &Bench, operations: usize, is_short: bool) -> (u32, u32) {
     let (mut old, mut new) = (0, 0);
     // The drop of the old slot, its erase, the first words, a word of the blob; check, commit word, seal.
     let first = [0, 1, 2, operations / 2];
@@ -261,14 +274,15 @@ pub fn power_cuts(bench: &Bench) {
         let again = PowerCut { at: 0, ..cut };
         let cuts = if place == Cut::Inside { 2 } else { 1 };
         let mut machine = bench.running(20);
+        machine.cuts_are_short = is_short;
         machine.chip.flash.cut_at(&[cut, again][..cuts]);
         let (_ended, _) = update(&mut machine, &plan(&bench.later));
         machine.run_ticks(20);
         assert!(machine.power_cuts > 0, "{cut:?}");
         let found = running(&mut machine);
+        let is_stored = (at, place) == (operations - 1, Cut::After);
         assert!(
-            found == bench.later
-                || found == bench.blob && (at, place) != (operations - 1, Cut::After),
+            found == bench.later && !is_short || found == bench.blob && (is_short || !is_stored),
             "after {cut:?}"
         );
         (old, new) = match found == bench.blob {
@@ -282,9 +296,5 @@ pub fn power_cuts(bench: &Bench) {
             "after {cut:?}"
         );
     }
-    println!(
-        "RESULT firmware_power_cuts={} old={old} new={new}",
-        old + new
-    );
-    assert!(old > 0 && new > 0, "all cuts ended alike");
+    (old, new)
 }

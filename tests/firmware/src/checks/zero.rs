@@ -43,13 +43,14 @@ fn re_zeroed(bench: &Bench) -> Machine {
     machine
 }
 
-/// The first pose after a reset by the watchdog or by the pin has the zero deviation subtracted. After
+/// The first pose after a reset by the watchdog, by the pin or by a brown-out has the zero deviation subtracted. After
 /// power-on there is no zero deviation, and none is missed.
 pub fn over_resets(bench: &Bench) {
     type Reset = fn(&mut Machine);
-    let resets: [(Reset, bool, bool); 3] = [
+    let resets: [(Reset, bool, bool); 4] = [
         (|machine| machine.hold_ns = 25 * MS, true, true),
         (Machine::reset_by_pin, true, false),
+        (Machine::brown_out, true, false),
         (Machine::power_cycle, false, false),
     ];
     for (reset, stays, by_fault) in resets {
@@ -70,8 +71,8 @@ pub fn over_resets(bench: &Bench) {
     }
 }
 
-/// The running blob is gone from flash, or the retained record is damaged: no pose comes, and the state
-/// says so and reports a lost zero deviation.
+/// The running blob is gone from flash, or the retained record is damaged in a brown-out: no pose comes, and the state says
+/// so and reports a lost zero deviation.
 pub fn lost(bench: &Bench) {
     let record = bench.image.address("RETAINED");
     type Change<'c> = &'c dyn Fn(&mut Machine);
@@ -86,7 +87,7 @@ pub fn lost(bench: &Bench) {
     for (fault, reason, change) in changes {
         let mut machine = re_zeroed(bench);
         change(&mut machine);
-        machine.hold_ns = 25 * MS;
+        machine.brown_out();
         Seen::after(&mut machine, 300);
         let seen = Seen::after(&mut machine, 300);
         assert_eq!(seen.axes.len(), 0);
