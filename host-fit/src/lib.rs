@@ -11,6 +11,7 @@
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
 //! | [`diff`] | what changed between two blobs |
+//! | [`scope`] | sensors as traces in a terminal |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, updated |
 //! | [`join`](mod@join) | records of the sensors and of the reference with their clocks, made into a log |
 //! | [`cli`] | the commands |
@@ -28,3 +29,4 @@ pub mod diff;
 pub mod join;
 pub mod output;
 pub mod report;
+pub mod scope;

@@ -16,6 +16,7 @@ mod rate;
 mod signal;
 mod spectrum;
 
+pub use noise::white_noise;
 pub use outliers::outliers;
 pub use rate::SlowRate;
 pub use signal::{Signal, runs, signals};

@@ -38,6 +38,8 @@ pub(crate) struct LiveSettings {
     pub(crate) duration: Option<Duration>,
     /// Seconds from line to line.
     pub(crate) every: Duration,
+    /// Show lines, also on a terminal.
+    pub(crate) plain: bool,
     /// Give up a tick if frames are still missing after this time.
     pub(crate) assembly_us: u32,
     /// Call the sensors stale after this time without a good frame.
@@ -75,6 +77,9 @@ pub enum LiveError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The terminal cannot be used.
+    #[error("the terminal cannot be used: {0}; show lines with --plain")]
+    Terminal(#[from] std::io::Error),
     /// The record cannot be begun.
     #[error("cannot record to {0}")]
     NoRecord(OutputError),

@@ -34,9 +34,12 @@ pub(super) struct LiveArgs {
     /// End after this many seconds; without it, on Ctrl-C.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Duration>,
-    /// Seconds from line to line.
+    /// Seconds from line to line, where lines are shown.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     every: Duration,
+    /// Show a line every second, as where the output is no terminal, and no scope.
+    #[arg(long)]
+    plain: bool,
     /// Give up a tick if frames are still missing after this time.
     #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     assembly_us: u32,
@@ -56,6 +59,7 @@ impl LiveArgs {
             listen_only: self.listen_only,
             duration: self.duration,
             every: self.every,
+            plain: self.plain,
             assembly_us: self.assembly_us,
             stale_us: self.stale_us,
         }

@@ -25,6 +25,7 @@ mod recalibrate;
 mod record;
 mod report;
 mod rezero;
+mod scope;
 mod shell;
 mod simulate;
 mod terminal;
@@ -114,6 +115,8 @@ commands! {
     Diff(diff::DiffArgs) => diff::run,
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
+    /// Show the sensors of a log in the terminal, also while the log grows.
+    Scope(scope::ScopeArgs) => scope::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
     Live(live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).

@@ -16,7 +16,16 @@ pub(super) fn fifth_differences(run: &[f64]) -> impl Iterator<Item = f64> {
 
 /// The standard deviation of the white noise, in the unit of the values.
 pub(super) fn white(signal: &Signal) -> Option<f64> {
-    let differences = signal.runs().flat_map(fifth_differences).map(f64::abs);
+    of_runs(signal.runs())
+}
+
+/// The standard deviation of the white noise of consecutive values, in their unit; `None` for fewer than six.
+pub fn white_noise(values: &[f64]) -> Option<f64> {
+    of_runs([values].into_iter())
+}
+
+fn of_runs<'r>(runs: impl Iterator<Item = &'r [f64]>) -> Option<f64> {
+    let differences = runs.flat_map(fifth_differences).map(f64::abs);
     let middle = median(&mut differences.collect::<Vec<f64>>())?;
     Some(NORMAL * middle / POWER.sqrt())
 }

@@ -35,7 +35,8 @@ pub(super) fn say(what: &str) {
     let _ = writeln!(std::io::stderr(), "{what}");
 }
 
-fn state(shown: &Shown<'_>) -> String {
+/// The state, with the status bits in words.
+pub(super) fn state(shown: &Shown<'_>) -> String {
     let status = shown.reading.map_or(Status::GOOD, |r| r.status);
     if shown.is_down {
         "interface down".to_owned()

@@ -1,20 +1,29 @@
 //! The loop of `live`: the node on an interface, recorded and shown.
 
 use super::bus::now_us;
-use super::display::{Shown, say, show};
+use super::display::{self, Shown, show};
 use super::node::{Node, NodeSettings};
 use super::{Bus, BusError, LiveError, LiveSettings};
 use crate::bus::BusAddress;
 use crate::output::record_file::RecordFile;
 use crate::output::{OutputError, blob_file, is_standard_output};
+use crate::scope::{History, Scale, ScopeRow, Screen, Wish};
 use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
 use hal_adapters::candump::LogLine;
-use runtime::{ParameterSet, Reading};
+use hallstage_input::channel::Channel;
+use runtime::{ParameterSet, RawFrame, Reading};
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
 const WAIT_MAX: Duration = Duration::from_millis(100);
+
+/// Time between two pictures of the scope.
+const PICTURE: Duration = Duration::from_millis(100);
+
+/// The servo period of a bus, s.
+const SERVO_S: f64 = 0.002;
 
 /// How long a frame may wait for a place in the transmit queue: half a servo period.
 const SEND_DEADLINE: Duration = Duration::from_millis(1);
@@ -45,6 +54,13 @@ pub(crate) fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), Live
         Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
     };
+    let takes_output = settings.record.as_deref().is_some_and(is_standard_output);
+    let has_scope = !settings.plain && !takes_output && std::io::stdout().is_terminal();
+    let scope = match has_scope {
+        true => Some(Scope::open(&set, settings)?),
+        false => None,
+    };
+    let every = if has_scope { PICTURE } else { settings.every };
     let decoder = set.decoder();
     let mut session = Session {
         node: Node::new(decoder, &node),
@@ -53,7 +69,8 @@ pub(crate) fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), Live
         record,
         record_ended: None,
         sends: !settings.listen_only,
-        shows_on_stderr: settings.record.as_deref().is_some_and(is_standard_output),
+        shows_on_stderr: takes_output,
+        scope,
         started: Instant::now(),
         shown_at: (0, Duration::ZERO),
         rate_hz: 0.0,
@@ -62,11 +79,13 @@ pub(crate) fn run(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), Live
         not_sent: 0,
         is_down: false,
     };
-    let ended = session.until(stop, settings.duration, settings.every);
+    let ended = session.until(stop, settings.duration, every);
     // What was recorded is kept whatever ended the run.
     session.write(RecordFile::finish);
-    session.show();
+    let shown = session.show();
+    drop(session.scope.take());
     ended?;
+    shown?;
     match session.record_ended {
         None => Ok(()),
         Some(ended) => Err(ended),
@@ -101,6 +120,7 @@ struct Session<'d> {
     record_ended: Option<LiveError>,
     sends: bool,
     shows_on_stderr: bool,
+    scope: Option<Scope>,
     started: Instant,
     /// Decoded ticks and time at the last display.
     shown_at: (u32, Duration),
@@ -132,7 +152,9 @@ impl Session<'_> {
                 let s = (elapsed - since).as_secs_f64();
                 self.rate_hz = f64::from(now - ticks) / s;
                 self.shown_at = (now, elapsed);
-                self.show();
+                if self.show()? == Wish::Quit {
+                    break;
+                }
             }
             self.turn()?;
             self.write(RecordFile::keep_up);
@@ -172,7 +194,7 @@ impl Session<'_> {
             Ok(Some(frame)) => {
                 if self.is_down {
                     self.is_down = false;
-                    say("the interface is up again");
+                    self.say("the interface is up again");
                 }
                 Ok(Some(frame))
             }
@@ -184,11 +206,14 @@ impl Session<'_> {
     fn take(&mut self, frame: &StampedFrame) {
         self.record(frame);
         let step = self.node.take(frame, &mut self.out);
-        if let Some((_, reading)) = step.tick {
+        if let Some((raw, reading)) = step.tick {
             self.last = Some(reading);
+            if let Some(scope) = &mut self.scope {
+                scope.push(frame.time_us, &raw);
+            }
         }
         if let Some(command) = step.command {
-            say(&format!("request: {command:?}"));
+            self.say(&format!("request: {command:?}"));
         }
         self.note(step.fault);
     }
@@ -212,7 +237,7 @@ impl Session<'_> {
                 source,
                 after_s: self.started.elapsed().as_secs_f64(),
             };
-            say(&format!("{ended}; decoding goes on"));
+            self.say(&format!("{ended}; decoding goes on"));
             self.record = None;
             self.record_ended = Some(ended);
         }
@@ -220,7 +245,7 @@ impl Session<'_> {
 
     fn note(&mut self, fault: Option<BusFault>) {
         if let Some(fault @ (BusFault::Stale { .. } | BusFault::SenderRestarted)) = fault {
-            say(&fault.to_string());
+            self.say(&fault.to_string());
         }
     }
 
@@ -249,7 +274,7 @@ impl Session<'_> {
         if matches!(error, BusError::Down { .. }) {
             if !self.is_down {
                 self.is_down = true;
-                say(&format!("{error}; waiting for it"));
+                self.say(&format!("{error}; waiting for it"));
             }
             std::thread::sleep(Duration::from_millis(1));
             Ok(())
@@ -260,7 +285,14 @@ impl Session<'_> {
         }
     }
 
-    fn show(&mut self) {
+    fn say(&mut self, what: &str) {
+        match &mut self.scope {
+            Some(scope) => what.clone_into(&mut scope.note),
+            None => display::say(what),
+        }
+    }
+
+    fn show(&mut self) -> Result<Wish, LiveError> {
         let shown = Shown {
             elapsed_s: self.started.elapsed().as_secs_f64(),
             reading: self.last.as_ref(),
@@ -272,6 +304,56 @@ impl Session<'_> {
             is_stale: self.node.receiver().is_stale(),
             is_down: self.is_down,
         };
-        show(&shown, self.shows_on_stderr);
+        match &mut self.scope {
+            Some(scope) => Ok(scope.show(&shown)?),
+            None => {
+                show(&shown, self.shows_on_stderr);
+                Ok(Wish::GoOn)
+            }
+        }
+    }
+}
+
+/// The codes of the bus in a terminal.
+struct Scope {
+    screen: Screen,
+    history: History,
+    /// What happened last.
+    note: String,
+}
+
+impl Scope {
+    fn open(set: &ParameterSet, settings: &LiveSettings) -> std::io::Result<Self> {
+        let (hall, gaps) = (set.constants.hall_window, set.constants.capacitive_window);
+        let scales = [0, 1, 2, 3, 4, 5].map(|sensor| Scale {
+            // Hall probes, beams, gaps.
+            channel: Channel::SINGLE[if sensor < 3 { sensor } else { sensor + 3 }],
+            per_code: 1.0,
+            unit: "codes",
+            window: if sensor < 3 { hall } else { gaps },
+        });
+        let title = format!("{} {}", settings.can.interface, set.serial);
+        Ok(Self {
+            screen: Screen::open()?,
+            history: History::new(title, scales, SERVO_S),
+            note: String::new(),
+        })
+    }
+
+    fn push(&mut self, time_us: u64, raw: &RawFrame) {
+        let [a, b, c] = raw.hall;
+        let [p, q, r] = raw.capacitive;
+        self.history.push(ScopeRow {
+            t_us: time_us as f64,
+            codes: [a, b, c, p, q, r],
+            designed_m: None,
+        });
+    }
+
+    fn show(&mut self, shown: &Shown<'_>) -> std::io::Result<Wish> {
+        let state = display::state(shown);
+        self.history.state = format!("{state}  {:.0} ticks/s  {}", shown.rate_hz, self.note);
+        self.screen.draw(&self.history)?;
+        self.screen.keys(&mut self.history, Duration::ZERO)
     }
 }
