@@ -6,6 +6,7 @@ use hallstage_input::finding::{Cause, Code, Correction};
 use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
+use std::ops::Range;
 
 /// A linear transform of the rows: matrices for the three Hall signals, the reference and the vertical pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,8 +44,21 @@ impl Mistake {
     pub(super) fn is_other_pass(&self) -> bool {
         self.correction.is_scale_of_beams() && matches!(self.value, Some(0.5 | 2.0))
     }
+
+    /// Whether X, Y, Rz are right in spite of it, as errors in service show.
+    pub(super) fn leaves_pose(&self) -> bool {
+        let is_gap = |channel: &Channel| {
+            use Channel::{Gap1, Gap2, Gap3, Gaps};
+            matches!(channel, Gap1 | Gap2 | Gap3 | Gaps)
+        };
+        self.code == Code::ScaleWrong
+            && self.value.is_some_and(|by| GAP_FACTORS.contains(&by))
+            && self.correction.channels().iter().all(is_gap)
+    }
 }
 
+/// Gaps that are wrong by such a factor make no X, Y, Rz wrong: the sensitivity of the probes follows.
+const GAP_FACTORS: Range<f64> = 0.5..2.0;
 /// Factors per decade that are tried.
 const FACTORS: i32 = 48;
 /// Decades of factors: units may be um for m.
@@ -95,8 +109,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             scales(&mut out, &Correction::Scale(named.clone()), times);
             for mistake in out[first..].iter_mut().filter(|_| named == [Channel::Gaps]) {
                 // The field of such magnets falls with height half as fast, or less than twice.
-                let factors = 0.5..2.0;
-                mistake.may_be_magnets = mistake.value.is_some_and(|by| factors.contains(&by));
+                mistake.may_be_magnets = mistake.value.is_some_and(|by| GAP_FACTORS.contains(&by));
             }
             out.push(mistake(inverted, Correction::Sign(named), times(-1.0)));
         }

@@ -142,10 +142,10 @@ pub fn structure(
     ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let gain = as_logged - ranked.first()?.0;
     if gain < likely {
-        // Single pass taken for double pass needs no odds: it is common, and a factor of two in each pose.
+        // Single pass taken for double pass needs no odds for a warning: it is common, and a factor of two in each pose.
         ranked.retain(|(rank, mistake)| mistake.is_other_pass() && *rank < as_logged);
     }
-    let is_sure = gain > sure || gain < likely;
+    let is_sure = gain > sure;
     let least = ranked.first().map_or(f64::INFINITY, |(rank, _)| *rank);
     if least > SOUND_MAX {
         let tolerances = (as_logged / SOUND_MAX).sqrt();
@@ -182,8 +182,9 @@ fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
         is_sure,
         may_be_magnets,
     });
-    // Other magnets are no mistake.
-    let severity = match is_sure && !may_be_magnets {
+    // Other magnets are no mistake, and scales of gaps make heights and tilts wrong, not X, Y, Rz.
+    let leaves_pose = named.iter().flatten().all(|mistake| mistake.leaves_pose());
+    let severity = match is_sure && !may_be_magnets && !leaves_pose {
         true => Severity::Refuse,
         false => Severity::Warn,
     };
