@@ -140,18 +140,17 @@ pub fn columns(dataset: &Dataset, stage: &Stage) -> Vec<Column> {
 }
 
 /// The noise of the probes A, B, C that makes the noise floor in service, m: the median of the logs, from the readings
-/// alone, so no reference raises the floor. Steps that are coarser than a code and noise that the probes share are taken off,
-/// and a noisy probe counts as the middle probe. `None` without six consecutive rows.
+/// alone, so no reference raises the floor. Steps that are coarser than a code and noise that the probes share are taken off.
+/// A probe that is noisy, or whose noise a filter hides, counts as the middle of the others. `None` without six consecutive
+/// rows.
 pub fn probe_noise_m(columns: &[Column]) -> Option<[f64; 3]> {
-    let own_m = |probe: usize| {
-        let own = columns
-            .iter()
-            .filter(|column| column.channel == PROBES[probe]);
+    let own_m = PROBES.map(|probe| {
+        let shows = |of: &&Column| of.channel == probe && !of.is_low_passed && of.slow.is_none();
+        let own = columns.iter().filter(shows);
         median(&mut own.filter_map(Column::fine_noise_m).collect::<Vec<f64>>())
-    };
-    let own_m = [own_m(0)?, own_m(1)?, own_m(2)?];
-    let usual_m = median(&mut own_m.clone())?;
-    Some(own_m.map(|m| if m > NOISY * usual_m { usual_m } else { m }))
+    });
+    let usual_m = median(&mut own_m.into_iter().flatten().collect::<Vec<f64>>())?;
+    Some(own_m.map(|m| m.filter(|m| *m <= NOISY * usual_m).unwrap_or(usual_m)))
 }
 
 /// Takes the covariance of the outliers where it is larger: spectra have no row that few windows have.
