@@ -161,6 +161,10 @@ impl<'a> Scan<'a> {
         if suspect.quantity().is_some() && !(is_time && suspect.is_single()) {
             found.push(whole(Shape::Ramp));
         }
+        // A lost row makes all later rows late.
+        if is_time {
+            found.push(onset(std::slice::from_ref(&all)));
+        }
         if suspect.can_stay() {
             found.push(whole(Shape::Arc));
             found.push(onset(std::slice::from_ref(&all)));
@@ -187,12 +191,21 @@ impl<'a> Scan<'a> {
         // First means far apart, then all means near the best. Half the square root of their number apart, because a
         // step near the end of a movement shows only for a moment.
         let apart = (self.steps.len().isqrt() / 2).max(1);
+        // A moment at the end of a log does not show the state in which the stage ends.
+        let end = |range: &Range<usize>| match self.steps.len() {
+            last if range.end == last => last - apart,
+            _ => range.end,
+        };
         let coarse = ranges.iter().filter_map(|range| {
-            let wanted = |at: usize| at > range.start && (at - range.start).is_multiple_of(apart);
+            let wanted = |at: usize| {
+                (range.start + 1..end(range)).contains(&at)
+                    && (at - range.start).is_multiple_of(apart)
+            };
             Some((largest(self.scan(column, range, wanted))?, range))
         });
         let ((around, _), range) = coarse.max_by(|(a, _), (b, _)| a.1.total_cmp(&b.1))?;
-        let wanted = |at: usize| at > range.start && at.abs_diff(around) < apart;
+        let wanted =
+            |at: usize| (range.start + 1..end(range)).contains(&at) && at.abs_diff(around) < apart;
         let fine = self.scan(column, range, wanted);
         let likely = fine
             .iter()

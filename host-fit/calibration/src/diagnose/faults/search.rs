@@ -10,37 +10,36 @@ use hallstage_input::channel::Channel;
 
 /// Causes are undecided where their gains differ by less than this part: large faults are not quite linear.
 const ALIKE_PART: f64 = 0.01;
+/// The most likely faults that are tried where others explain too little.
+const TRIES_MAX: usize = 4;
 
 impl Finder<'_> {
-    /// The faults, and the estimate with the faults among its unknowns; `None` where there are no faults.
-    pub(super) fn search(&self, faultless: &Estimate) -> Option<(Vec<Fault>, Option<Estimate>)> {
+    /// The faults, and the estimate with the faults among its unknowns, if there are any.
+    pub(super) fn search(&self, faultless: &Estimate) -> (Vec<Fault>, Option<Estimate>) {
         let (mut faults, mut last): (Vec<Fault>, Option<Estimate>) = (Vec::new(), None);
         while faults.len() < FAULTS_MAX {
             let estimate = last.as_ref().unwrap_or(faultless);
-            let found = self.ranked(estimate, &faults)?;
-            let needs = |fault: &Fault| self.needs(fault, &faults);
-            let Some(best) = found.first().filter(|best| best.gain > needs(best)) else {
+            let Some(found) = self.ranked(estimate, &faults) else {
                 break;
             };
-            let needs = needs(best);
-            let with = [&faults[..], std::slice::from_ref(best)].concat();
-            // A large fault bends the effects of the others, too.
-            let next = self.refitted(estimate, &with);
-            let next = next.and_then(|next| self.refitted(&next, &with));
-            // It explains more than what remains, and most of the noise of a beam, which makes accelerations of its own.
-            let follows = best.suspect.follows;
-            let explains = |next: &Estimate| {
-                let (before, after) = (estimate.chi_squared, next.chi_squared);
-                let is_noise = || {
-                    matches!(follows, Follows::Acceleration(_) | Follows::OwnAcceleration)
-                        || noisy_beam(&self.effects(estimate), estimate).is_some()
-                };
-                before - after > needs * misfit(&self.means, next)
-                    && (before - after > after - self.means.freedom() || !is_noise())
-            };
-            let Some(next) = next.filter(explains) else {
+            let likely = found
+                .iter()
+                .filter(|fault| fault.gain > self.needs(fault, &faults));
+            let mut explained = likely.take(TRIES_MAX).filter_map(|fault| {
+                let with = [&faults[..], std::slice::from_ref(fault)].concat();
+                // A large fault bends the effects of the others, too.
+                let next = self.refitted(estimate, &with)?;
+                let next = self.refitted(&next, &with)?;
+                let gain = estimate.chi_squared - next.chi_squared;
+                let least = self.needs(fault, &faults) * misfit(&self.means, &next);
+                (gain > least).then_some((fault, next))
+            });
+            let Some((best, next)) = explained.next() else {
                 break;
             };
+            if self.is_noise(best, [estimate, &next]) {
+                break;
+            }
             let alike = self.alike(best, &found, misfit(&self.means, &next));
             faults.push(Fault {
                 alike,
@@ -48,7 +47,18 @@ impl Finder<'_> {
             });
             last = Some(next);
         }
-        Some((faults, last))
+        (faults, last)
+    }
+
+    /// Whether accelerations explain too little: noise of a beam makes some of its own.
+    fn is_noise(&self, fault: &Fault, [before, after]: [&Estimate; 2]) -> bool {
+        let makes_noise = matches!(
+            fault.suspect.follows,
+            Follows::Acceleration(_) | Follows::OwnAcceleration
+        );
+        let is_noise = || makes_noise || noisy_beam(&self.effects(before), before).is_some();
+        let left = after.chi_squared - self.means.freedom();
+        before.chi_squared - after.chi_squared <= left && is_noise()
     }
 
     /// Further faults, the most likely first.

@@ -121,6 +121,28 @@ fn channels_that_are_late_and_a_clock_that_drifts_are_named_and_taken_off() {
     }
 }
 
+/// A row of the reference is lost, so that all later rows are a row early.
+#[test]
+fn a_lost_row_is_named_with_its_place_and_taken_off() {
+    let mut lost = recording(3);
+    for samples in &mut lost.movements[1..] {
+        let shown: Vec<_> = samples.iter().map(|sample| sample.beams_nm).collect();
+        for (sample, next) in samples.iter_mut().zip(&shown[1..]) {
+            sample.beams_nm = *next;
+        }
+    }
+    let diagnosis = diagnosed(lost, |_, _| {});
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+    let found = &diagnosis.findings[0];
+    assert_eq!(
+        (found.code(), found.channel().as_deref(), found.movement()),
+        (Code::ReferenceLag, Some("ifm"), Some("1")),
+        "{found:#?}"
+    );
+    assert!((found.value().expect("ms") + 2.0).abs() < 0.1, "{found:?}");
+    assert!(diagnosis.repair.is_some());
+}
+
 /// Offsets within a movement, steps to the end and ramps, of channels of all kinds.
 #[test]
 fn what_the_scan_promises_is_what_a_refit_gains() {
