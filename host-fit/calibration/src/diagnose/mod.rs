@@ -138,7 +138,7 @@ pub fn diagnose_log(
     };
     let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
     let described = (is_described, estimate);
-    let probe_lags_s = out.add_faults(dataset, &without_outliers, stage, by, described);
+    let found = out.add_faults(dataset, &without_outliers, stage, by, described);
     out.findings.extend(poor);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
@@ -165,12 +165,14 @@ pub fn diagnose_log(
                 ..repair.motion
             };
         }
-        if let Some(lags_s) = probe_lags_s {
+        if let Some(lags_s) = found.and_then(|(lags_s, _)| lags_s) {
             motion = motion.with_other_lags(lags_s);
         }
         InMotion::new(&motion, parameters, stage, &at_rest?)
     });
     let mut stays = columns.stays;
+    let (_, drifts) = found.unwrap_or_default();
+    (0..3).for_each(|axis| stays[axis] += drifts[axis]);
     let late = out
         .findings
         .iter()
@@ -219,7 +221,7 @@ const fn stands(found: &Finding) -> bool {
 
 impl Diagnosis {
     /// Adds the faults of signals, channels and structure, and what they predict. The lags of A, B, C behind their
-    /// mean, s, where the log shows them. `is_described` where the parameters describe the log, `estimate` of a fit of the field model.
+    /// mean, s, where the log shows them, and the variances that drifts add in service. `is_described` where the parameters describe the log, `estimate` of a fit of the field model.
     fn add_faults(
         &mut self,
         dataset: &Dataset,
@@ -227,7 +229,7 @@ impl Diagnosis {
         stage: &Stage,
         by: Calibrated,
         (is_described, estimate): (bool, Option<&Estimate>),
-    ) -> Option<[f64; 3]> {
+    ) -> Option<(Option<[f64; 3]>, [f64; 3])> {
         let (findings, bad) = signals::signal_findings(dataset, stage, &self.columns);
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
@@ -257,10 +259,11 @@ impl Diagnosis {
         };
         self.findings.extend(mistake.filter(stands_alone));
         let mut of = of_rows?;
-        self.predicted = of.predicted;
+        // Channels in another order, or rows without a channel, show nothing of service.
         if is_refused(&self.findings) {
             return None;
         }
+        self.predicted = of.predicted;
         if let Some((repair, expected)) = of.repair {
             let stand = self.findings.iter_mut().filter(|found| stands(found));
             let taken_off = |found: &&mut Finding| found.code() != Code::ModelLacks;
@@ -271,7 +274,7 @@ impl Diagnosis {
             (self.predicted, self.repair) = (Some(expected), Some(repair));
         }
         self.findings.extend(of.findings);
-        of.probe_lags_s
+        Some((of.probe_lags_s, of.drifts))
     }
 
     /// Adds the findings about the fit that no fault explains.
@@ -288,7 +291,9 @@ impl Diagnosis {
                 || found.code().entry().explains_from == Some(Severity::Note)
         };
         if !findings.iter().any(explains) {
-            findings.extend(fit_checks::undescribed(fit, dataset, stage));
+            if self.repair.is_none() {
+                findings.extend(fit_checks::undescribed(fit, dataset, stage));
+            }
             findings.extend(fit_checks::not_field(fit, self.predicted.as_ref()));
         }
     }

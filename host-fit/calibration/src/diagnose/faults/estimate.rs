@@ -47,7 +47,7 @@ pub(super) struct Estimate {
     pub(super) step: DVector<f64>,
     /// Sum of squares of the whitened residuals.
     pub(super) chi_squared: f64,
-    noise: Noise,
+    pub(super) noise: Noise,
     at: Point,
     /// The precision of the prior; its mean is zero.
     pub(super) prior: DMatrix<f64>,

@@ -101,9 +101,9 @@ impl Finder<'_> {
         // The noise of what is estimated beside the parameters.
         let systematic = |covariance: &DMatrix<f64>| declared.variance(covariance).systematic;
         let [with, without] = [&estimate.curvature, &bent].map(|of| systematic(&of.inverse()));
-        let slow = match by.is_for_service {
-            true => declared.by_signals(slow_m2(&self.effects(estimate), estimate)),
-            false => [0.0; 3],
+        let [slow, drifts] = match by.is_for_service {
+            true => slow_m2(&self.effects(estimate), estimate).map(|m2| declared.by_signals(m2)),
+            false => [[0.0; 3]; 2],
         };
         // Variances by errors of the parameters, which sensors that stay wrong make larger or smaller.
         let variances = |off: &[f64]| {
@@ -200,7 +200,11 @@ impl Finder<'_> {
         let refitted = match changes.len() {
             all if all == faults.len() => None,
             0 => None,
-            _ => Some(self.refitted(faultless, &changes)?),
+            _ => {
+                let refitted = self.refitted(faultless, &changes);
+                is_clear &= refitted.is_some();
+                refitted
+            }
         };
         let repaired = refitted.as_ref().unwrap_or(match changes.is_empty() {
             true => faultless,
@@ -224,19 +228,21 @@ impl Finder<'_> {
             lag_s: lag_s - middle(motion.dynamics.probe_lag_s),
             motion: motion.with_other_lags(stays.probe_lags_s),
         };
-        let judged = if is_better { &expected } else { &predicted };
+        let judged = if is_better { expected } else { predicted };
+        let judged = judged.with_added(drifts);
         let unexplained = variances(&bent.solve(&by_motion).as_slice()[..COUNT]);
         let unexplained = [0, 1, 2].map(|axis| slow[axis] + unexplained[axis]);
         let channel = faults
             .iter()
             .find(|fault| fault.suspect.quantity().is_none());
         if by.is_for_service {
-            findings.extend(unexplained_finding(unexplained, channel, judged));
+            findings.extend(unexplained_finding([unexplained, drifts], channel, &judged));
         }
         Some(Faults {
             findings,
             predicted: Some(predicted),
             probe_lags_s: (!faults.is_empty()).then_some(stays.probe_lags_s),
+            drifts,
             repair: is_better.then_some((repair, expected)),
             residual,
         })
@@ -257,17 +263,22 @@ impl Finder<'_> {
     }
 }
 
-/// Errors that no change explains, where they are felt in service; `predicted` includes them. The fault is the clearest.
+/// Errors that no change explains, where they are felt in service, and drifts, which refuse no calibration; `predicted`
+/// includes them. The fault is the clearest.
 fn unexplained_finding(
-    variances: [f64; 3],
+    [variances, drifts]: [[f64; 3]; 2],
     fault: Option<&Fault>,
     predicted: &Predicted,
 ) -> Option<Finding> {
-    let ratio = |axis: usize| (1.0 + variances[axis] / predicted.noise(axis).powi(2)).sqrt();
-    let ratio = ratio(0).max(ratio(1)).max(ratio(2));
+    let cost = |added: f64| {
+        let of =
+            |axis: usize| (variances[axis] + added * drifts[axis]) / predicted.noise(axis).powi(2);
+        (1.0 + of(0).max(of(1)).max(of(2))).sqrt()
+    };
+    let ratio = cost(1.0);
     let severity = match predicted.worst_ratio() <= GOOD_MAX {
         true => Severity::Note,
-        false => severity(ratio).max(Severity::Warn),
+        false => severity(cost(0.0)).max(Severity::Warn),
     };
     let found = Finding::new(Kind::Inconsistent { ratio }).with_severity(severity);
     let found = Finding {

@@ -68,3 +68,23 @@ fn a_missing_bit_of_a_probe_is_in_the_prediction() {
     // The bit has 4 times the noise of the probe, and half of the values miss it.
     assert!(cost > 2.0 && ratio > 0.95 * cost, "{ratio} {cost}");
 }
+
+/// A filter that takes slow residuals for a drift of the reference sees a tenth of such a line.
+#[test]
+fn a_slow_line_in_all_probes_is_in_the_prediction() {
+    let mut slow = recording(3);
+    let codes = 2e-6 / stage().hall.m_per_count;
+    let period_s = stage().servo_period_s;
+    for samples in &mut slow.movements {
+        for (k, sample) in samples.iter_mut().enumerate() {
+            let turn = std::f64::consts::TAU * 0.2 * k as f64 * period_s;
+            let off = (codes * turn.sin()).round() as i32;
+            sample.hall = sample.hall.map(|code| code + off);
+        }
+    }
+    let diagnosis = diagnosed(slow, |_, _| {});
+    assert!(diagnosis.verdict != Some(Verdict::Good));
+    // 1.4 um rms beside a noise of 0.5 um.
+    let ratio = diagnosis.predicted.expect("figures").worst_ratio();
+    assert!((1.8..5.0).contains(&ratio), "{ratio}");
+}
