@@ -133,6 +133,18 @@ impl Budget {
         self
     }
 
+    /// The noise floor of X, Y, Rz, rms over service: m, m, rad.
+    pub fn noise(&self) -> [f64; 3] {
+        self.sources
+            .first()
+            .map_or([f64::NAN; 3], |noise| noise.rms)
+    }
+
+    /// Errors of X, Y, Rz in service without those of the declared inputs, rms: m, m, rad.
+    pub fn in_service(&self) -> [f64; 3] {
+        self.variances(false).map(f64::sqrt)
+    }
+
     /// Variances of X, Y, Rz by the declared inputs, or by the sources that the log shows: m2, m2, rad2.
     fn variances(&self, are_declared: bool) -> [f64; 3] {
         let of_kind = self

@@ -24,13 +24,15 @@
 //! ```
 
 mod described;
+mod known;
 
 use described::check_described;
+pub use known::{StoredPosterior, own_logs};
 
 use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
-use crate::fit::{Fit, RANGE_MARGIN, calibration};
+use crate::fit::{RANGE_MARGIN, calibration};
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::channels::columns;
@@ -44,8 +46,6 @@ use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::service::ServiceVariance;
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::update::{Change, update};
-use hallstage_solver::estimator::whiten::Noise;
-use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
@@ -57,40 +57,6 @@ const OPEN_MAX_GAINS: f64 = 0.05;
 /// The same with all parameters: 0.1 after 4 s of all six axes, 1.2 after 2 s. Errors in service are then 1.1 times
 /// the noise floor.
 const OPEN_MAX_ALL: f64 = 0.21;
-/// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StoredPosterior {
-    /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`].
-    pub covariance: DMatrix<f64>,
-    /// The noise of the log.
-    pub noise: Noise,
-    /// Chi-square over residuals of the fit; above 1 where the model is incomplete.
-    pub misfit: f64,
-    /// The faults of the log that the calibration is without, in words: see
-    /// [`Repair`](crate::fit::Repair).
-    pub repaired: Vec<String>,
-    /// The uncertainty in service, source by source.
-    pub budget: Option<Budget>,
-}
-
-impl StoredPosterior {
-    /// Of a fit; `None` of other models than the field model.
-    pub fn from_fit(fit: &Fit) -> Option<Self> {
-        let figures = fit.field.as_ref()?;
-        let score = figures.score;
-        Some(Self {
-            covariance: fit.estimate.posterior.covariance.clone(),
-            noise: Noise {
-                white_m: fit.estimate.posterior.white_m,
-                ..figures.noise
-            },
-            misfit: score.chi_squared / score.residuals.max(1) as f64,
-            repaired: Vec::new(),
-            budget: None,
-        })
-    }
-}
-
 /// A calibration brought up to date.
 #[derive(Clone, Debug)]
 pub struct Recalibration {
@@ -127,6 +93,8 @@ pub enum RecalibrateError {
     },
     /// `all` and `temperature` need the old posterior.
     NothingKnown,
+    /// The blob was fitted to these logs, so they show no change.
+    OwnLog(Vec<String>),
     /// A log without temperatures that the blob needs, or `temperature` of a blob without them.
     NoTemperature(&'static str),
     /// The log does not determine the change well enough.
@@ -280,9 +248,8 @@ pub fn recalibrate(
         known: known.map(|known| StoredPosterior {
             covariance: update.posterior.covariance.clone(),
             noise: update.noise,
-            misfit: known.misfit,
-            repaired: known.repaired.clone(),
             budget: diagnosis.budget.clone(),
+            ..known.with_log(dataset, stage)
         }),
         gains,
         after: service.ratios(),

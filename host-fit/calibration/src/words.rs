@@ -11,7 +11,7 @@ mod verdict;
 pub use finding::{message, remedy};
 pub use fit::{model_reason, search_stopped, stopped};
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
-pub use verdict::{OWN_LOG, up_to, verdict};
+pub use verdict::{own_logs, up_to, verdict};
 
 use hallstage_input::finding::{Finding, Severity};
 use serde::ser::SerializeStruct;

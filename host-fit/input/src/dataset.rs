@@ -118,6 +118,8 @@ pub struct Movement {
 pub struct LogSource {
     /// The path, as the user gave it.
     pub path: PathBuf,
+    /// SHA-256 of its decompressed text.
+    pub sha256: [u8; 32],
     /// Its rows in [`Dataset::rows`].
     pub rows: core::ops::Range<usize>,
     /// Number of rows that were read, also rows outside the dataset.
@@ -170,6 +172,7 @@ impl Dataset {
         let rows = start..self.rows.len();
         self.logs.push(LogSource {
             path: path.into(),
+            sha256: [0; 32],
             rows_read: rows.len(),
             movements_read: self.movements.iter().filter(|m| m.log == log).count(),
             rows,

@@ -191,7 +191,11 @@ fn read_texts<'t>(
     let mut hash = Sha256::new();
     let mut files = Vec::new();
     for (log, text) in texts.into_iter().enumerate() {
-        let text = text?.with_hash(hash);
+        // Of all logs so far, and of this one.
+        let text = text?.with_hashes(match log {
+            0 => vec![hash],
+            _ => vec![hash, Sha256::new()],
+        });
         let path = text.path().to_path_buf();
         let file = path.canonicalize().unwrap_or_else(|_| path.clone());
         if files.contains(&file) {
@@ -207,15 +211,17 @@ fn read_texts<'t>(
         let end = rows.end()?;
         reading.skipped_rows += end.skipped_rows;
         reading.warnings.extend(end.warnings);
+        let own = end.hashes.last().cloned().unwrap_or_default();
         let source = LogSource {
             path: end.path,
+            sha256: own.finalize().into(),
             rows: 0..0,
             rows_read: 0,
             movements_read: 0,
             has_reference: end.has_reference,
         };
         sampler.end_log(source);
-        hash = end.hash.unwrap_or_default();
+        hash = end.hashes.into_iter().next().unwrap_or_default();
     }
     if files.is_empty() {
         return Err(Place::new("", None).refuse(LogProblem::NoLog));

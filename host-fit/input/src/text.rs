@@ -39,7 +39,7 @@ pub struct TextReader<'a> {
     start: Vec<u8>,
     /// The first bytes of the text.
     opening: Vec<u8>,
-    hash: Option<Sha256>,
+    hashes: Vec<Sha256>,
 }
 
 /// Counts the bytes that it passes on.
@@ -105,7 +105,7 @@ impl<'a> TextReader<'a> {
             mark: Vec::new(),
             start: Vec::new(),
             opening: Vec::new(),
-            hash: None,
+            hashes: Vec::new(),
         };
         let mut start = text.piece(other_format::PROBE_BYTES)?;
         let utf16 = Utf16::from_start(&start);
@@ -150,18 +150,17 @@ impl<'a> TextReader<'a> {
         }
     }
 
-    /// Goes on with a hash: of all decompressed bytes, before they are decoded.
-    pub fn with_hash(self, mut hash: Sha256) -> Self {
-        hash.update(&self.mark);
-        Self {
-            hash: Some(hash),
-            ..self
+    /// Goes on with hashes: of all decompressed bytes, before they are decoded.
+    pub fn with_hashes(self, mut hashes: Vec<Sha256>) -> Self {
+        for hash in &mut hashes {
+            hash.update(&self.mark);
         }
+        Self { hashes, ..self }
     }
 
-    /// The hash of [`Self::with_hash`].
-    pub fn into_hash(self) -> Option<Sha256> {
-        self.hash
+    /// The hashes of [`Self::with_hashes`].
+    pub fn into_hashes(self) -> Vec<Sha256> {
+        self.hashes
     }
 
     /// The name of the file in messages.
@@ -186,7 +185,7 @@ impl<'a> TextReader<'a> {
     pub fn append(&mut self, text: &mut Vec<u8>, bytes: usize) -> Result<bool, SourceError> {
         let piece = self.piece(bytes);
         let piece = piece.map_err(|problem| problem.in_file(&self.path))?;
-        if let Some(hash) = &mut self.hash {
+        for hash in &mut self.hashes {
             hash.update(&piece);
         }
         let is_last = piece.is_empty();

@@ -59,7 +59,7 @@ impl Calibration {
         let fit = outcome.fitted.as_ref().map_err(internal)?;
         Ok(Self {
             set: fit.set.clone(),
-            known: outcome.known(),
+            known: outcome.known(&log.dataset, &designed),
             designed,
             stage,
             origin: Origin::Fit(Box::new(OfFit {
@@ -368,6 +368,7 @@ impl Calibration {
             operator,
             notes: notes.unwrap_or_default(),
             created: &self.set.created,
+            certificate: "",
             call: vec!["hallstage".into(), "fit".into()],
         };
         let blob = self.blob_bytes()?;

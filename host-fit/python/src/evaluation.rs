@@ -127,11 +127,12 @@ impl Evaluation {
     ) -> PyResult<()> {
         let of = &self.evaluated;
         let about = About {
-            title: "Verification of a calibration",
+            title: of.title(),
             serial: &self.serial,
             operator,
             notes: notes.unwrap_or_default(),
             created,
+            certificate: &of.certificate,
             call: vec!["hallstage".into(), "Calibration.evaluate".into()],
         };
         let stage_file = self.stage.get().path.as_ref();

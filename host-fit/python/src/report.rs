@@ -23,11 +23,11 @@ use std::path::{Path, PathBuf};
 pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
     let page = Page {
         title: "",
-        number: "",
+        number: String::new(),
         first: Vec::new(),
         verdict: Summary::new(subject),
         facts: Vec::new(),
-        causes: Cause::grouped(&subject.diagnosis.findings),
+        causes: Some(Cause::grouped(&subject.diagnosis.findings)),
         warnings,
         sections: Vec::new(),
     };
@@ -69,6 +69,8 @@ pub struct About<'a> {
     pub operator: Option<&'a str>,
     pub notes: BTreeMap<String, String>,
     pub created: &'a str,
+    /// The number of the certificate of the calibration that was judged; empty without one.
+    pub certificate: &'a str,
     /// The call that led to it, in words.
     pub call: Vec<OsString>,
 }
@@ -100,6 +102,7 @@ pub fn write(
         warnings,
         report: Some(report),
         as_found: None,
+        certificate: about.certificate.to_owned(),
     };
     let html = source.html().map_err(internal)?;
     if path.is_dir() {

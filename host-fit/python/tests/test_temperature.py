@@ -28,7 +28,7 @@ def test_a_calibration_with_temperatures_is_that_of_the_program(toml: Path, host
     stage = hs.Stage.load(toml)
     run = hs.plan(stage, seconds=8.0)
     folder = host_fit("plan", "--stage", toml, "--seconds", "8", "--out", "run.csv")
-    for name, hour in [("cold", -0.2), ("early", 0.2), ("warm", 3.5)]:
+    for name, hour in [("cold", -0.2), ("early", 0.2), ("warm", 3.5), ("later", 3.0)]:
         host_fit(
             "simulate", "--stage", toml, "--plan", "run.csv", "--seed", "3", f"--hour={hour}",
             "--out", f"{name}.csv",
@@ -53,8 +53,10 @@ def test_a_calibration_with_temperatures_is_that_of_the_program(toml: Path, host
         # NdFeB loses 0.12 %/K, and the runs are 3 K apart.
         assert all(-2e-3 < one.parameters[name].value < -5e-4 for name in NAMES[::2])
     assert opened.diff(cal)["parameters"]["k_a"]["change"] == 0
-    new = opened.recalibrate(hs.read_log(folder / "warm.csv", stage), what="temperature")
+    new = opened.recalibrate(hs.read_log(folder / "later.csv", stage), what="temperature")
     assert new.diff(opened)["parameters"]["k_a"]["sigma"] is not None
+    with pytest.raises(hs.LogRefused, match="fitted to warm.csv"):
+        opened.recalibrate(hs.read_log(folder / "warm.csv", stage), what="temperature")
 
     warm = hs.read_log(folder / "warm.csv", stage)
     pose = opened.decoder()(hall=warm.hall, caps=warm.caps, mount=warm.mount, body=warm.body)

@@ -4,14 +4,15 @@ use super::ErrorLimits;
 use crate::report::errors::{RowErrors, errors};
 use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
-use hallstage_calibration::diagnose::refusal::{Beyond, Refusal};
+use hallstage_calibration::diagnose::range::faster;
+use hallstage_calibration::diagnose::refusal::{Beyond, Refusal, are_elsewhere};
 use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob, diagnose_log};
-use hallstage_calibration::fit::{FitSettings, ModelChoice, counted, fit};
+use hallstage_calibration::fit::{Fit, FitError, FitSettings, ModelChoice, counted, fit};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
-use hallstage_calibration::recalibrate::StoredPosterior;
+use hallstage_calibration::recalibrate::{StoredPosterior, own_logs};
 use hallstage_calibration::words;
 use hallstage_input::axis::{Axis, PLANAR};
 use hallstage_input::dataset::Dataset;
@@ -58,6 +59,10 @@ pub struct Evaluation {
     limits: ErrorLimits,
     /// Why the blob does not do for these logs; `None` if it does.
     pub refusal: Option<Refusal>,
+    /// The logs that the blob was fitted to: they verify nothing.
+    pub own_logs: Vec<String>,
+    /// The number of the certificate of the blob; empty without one.
+    pub certificate: String,
 }
 
 impl Evaluation {
@@ -97,16 +102,32 @@ impl Evaluation {
             corrected.judge(&log.dataset, stage, zeros).errors
         });
         let by_row = decoded.errors_less(&sampled.zeros, &log.dataset);
-        let is_refitted = zeros == Zeros::Refit;
-        let blob_use = BlobUse::Evaluated { is_refitted };
         // As the blob's own errors were counted, whatever zeros are asked for.
         let comparable = judge.judgement(own_zeros).errors;
+        let rms = |errors: &PoseError| errors.axes.map(|axis| axis.rms);
+        let blob_use = BlobUse::Evaluated {
+            is_refitted: zeros == Zeros::Refit,
+            errors: rms(&comparable),
+            corrected: corrected.as_ref().map(rms),
+        };
         let usual = if is_field(set) { 3.0 } else { 10.0 };
         let limit = order.limit.unwrap_or(usual);
-        let other = other_log(set, &comparable, limit);
-        let mut diagnosis = match &other {
-            Some(_) => faults_of(&log.dataset, stage),
-            None => diagnose_blob(&log.dataset, stage, set, blob_use),
+        let mut other = other_log(set, &comparable, limit);
+        let mut diagnosis = match &mut other {
+            Some(Refusal::OtherLog { apart, .. }) => {
+                let own = fit(&log.dataset, stage, &FitSettings::new(ModelChoice::Auto));
+                *apart = own.as_ref().ok().map(|own| apart_from(set, &own.set));
+                let mut faults = faults_of(&log.dataset, stage, own.as_ref());
+                // It is about the fit to the log.
+                let predicted = faults.predicted.take();
+                if !apart.is_some_and(are_elsewhere) {
+                    let errors = (rms(&comparable), corrected.as_ref().map(rms));
+                    let fast = predicted.and_then(|of| faster(&log.dataset, stage, errors, &of));
+                    faults.findings.extend(fast);
+                }
+                faults
+            }
+            _ => diagnose_blob(&log.dataset, stage, set, blob_use),
         };
         diagnosis.validity = known.and_then(|known| {
             let parameters = FieldParameters::from_set(set, stage)?;
@@ -127,6 +148,8 @@ impl Evaluation {
         }
         Ok(Self {
             refusal,
+            certificate: known.map_or(String::new(), |known| known.certificate.clone()),
+            own_logs: own_logs(set, known, &log.dataset),
             set: set.clone(),
             stage: stage.clone(),
             log,
@@ -144,8 +167,8 @@ impl Evaluation {
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
         let mut warnings = words::messages(&self.log.warnings);
-        if self.set.logs_sha256 == self.log.dataset.sha256 {
-            warnings.push(words::OWN_LOG.to_owned());
+        if !self.own_logs.is_empty() {
+            warnings.push(words::own_logs(&self.own_logs));
         }
         let zeros = match self.refusal {
             Some(Refusal::OtherLog { .. }) => &[][..],
@@ -172,6 +195,14 @@ impl Evaluation {
         report
     }
 
+    /// The title of its page.
+    pub const fn title(&self) -> &'static str {
+        match self.own_logs.is_empty() {
+            true => "Verification of a calibration",
+            false => "Errors on the log of a calibration",
+        }
+    }
+
     /// How it ended, for reports.
     pub fn subject(&self) -> Subject<'_> {
         let own = self.set.fit.rms.map(f64::from);
@@ -186,7 +217,12 @@ impl Evaluation {
             diagnosis: &self.diagnosis,
             is_field: is_field(&self.set),
             errors: Some(&self.judgement.errors),
-            limits: if in_service { self.limits.0 } else { on_log },
+            limits: if in_service {
+                self.limits.accepted
+            } else {
+                on_log
+            },
+            guards: self.limits.guards,
             corrected: self.corrected.as_ref(),
             in_service,
         }
@@ -199,15 +235,28 @@ impl Evaluation {
     }
 }
 
+/// The largest difference of lever arms, m, and of angles, rad.
+fn apart_from(a: &ParameterSet, b: &ParameterSet) -> [f64; 2] {
+    let largest = |a: [f32; 3], b: [f32; 3]| {
+        let apart = a.into_iter().zip(b).map(|(a, b)| f64::from(a - b).abs());
+        apart.fold(0.0, f64::max)
+    };
+    let (a, b) = (&a.geometry, &b.geometry);
+    [
+        largest(a.lever_arm_m, b.lever_arm_m),
+        largest(a.misalignment_rad, b.misalignment_rad),
+    ]
+}
+
 /// What is wrong with a log, by a fit to the log itself: the residuals of a blob that does not describe it say nothing of
 /// its channels.
-fn faults_of(dataset: &Dataset, stage: &Stage) -> Diagnosis {
-    let own = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
+fn faults_of(dataset: &Dataset, stage: &Stage, own: Result<&Fit, &FitError>) -> Diagnosis {
     let Diagnosis {
         mut findings,
         columns,
+        predicted,
         ..
-    } = diagnose_log(dataset, stage, own.as_ref());
+    } = diagnose_log(dataset, stage, own);
     let is_fault = |found: &Finding| found.severity == Severity::Refuse || found.is_repaired;
     findings.retain(|found| is_fault(found) && found.code().entry().explains_from.is_some());
     findings
@@ -216,6 +265,7 @@ fn faults_of(dataset: &Dataset, stage: &Stage) -> Diagnosis {
     Diagnosis {
         findings,
         columns,
+        predicted,
         ..Diagnosis::default()
     }
 }
@@ -241,5 +291,6 @@ fn other_log(set: &ParameterSet, errors: &PoseError, factor: f64) -> Option<Refu
         worst,
         factor,
         is_field,
+        apart: None,
     })
 }

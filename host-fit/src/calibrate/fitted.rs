@@ -12,6 +12,7 @@ use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_calibration::words::{self, WordedRefusal};
+use hallstage_input::dataset::Dataset;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::SolveError;
@@ -178,13 +179,13 @@ impl JudgedFit {
         Some(words::refusal(refusal, &self.diagnosis.findings))
     }
 
-    /// What goes beside the blob: what is known of a field model; `None` of others.
-    pub fn known(&self) -> Option<StoredPosterior> {
+    /// What goes beside the blob of these logs: what is known of a field model; `None` of others.
+    pub fn known(&self, dataset: &Dataset, stage: &Stage) -> Option<StoredPosterior> {
         let known = StoredPosterior::from_fit(self.fitted.as_ref().ok()?)?;
         Some(StoredPosterior {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
             budget: self.diagnosis.budget.clone(),
-            ..known
+            ..known.with_log(dataset, stage)
         })
     }
 
@@ -201,7 +202,8 @@ impl JudgedFit {
             diagnosis: &self.diagnosis,
             is_field: self.is_field(),
             errors: self.fitted.as_ref().ok().map(|fit| &fit.judgement.errors),
-            limits: self.limits.0,
+            limits: self.limits.accepted,
+            guards: self.limits.guards,
             corrected: None,
             in_service: self.in_service().is_some(),
         }

@@ -12,9 +12,14 @@ use std::str::FromStr;
 /// The kinds of units of X, Y, Rz.
 const KINDS: [Dimension; 3] = [Dimension::Length, Dimension::Length, Dimension::Angle];
 
-/// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
+/// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ErrorLimits(pub [Option<f64>; 3]);
+pub struct ErrorLimits {
+    /// Errors that are accepted: the limits less the guard bands; `None` where any will do.
+    pub accepted: [Option<f64>; 3],
+    /// The guard bands.
+    pub guards: [f64; 3],
+}
 
 impl FromStr for ErrorLimits {
     type Err = String;
@@ -35,7 +40,7 @@ impl FromStr for ErrorLimits {
             if !(number.is_finite() && number > 0.0) {
                 return Err(format!("`{part}`: a limit above zero is needed"));
             }
-            if limits.0[axis].replace(number * si).is_some() {
+            if limits.accepted[axis].replace(number * si).is_some() {
                 return Err(format!("{name} has two limits"));
             }
         }
@@ -54,20 +59,32 @@ impl ErrorLimits {
         budget: Option<&Budget>,
     ) -> Self {
         let declared = budget.map_or([0.0; 3], Budget::declared);
-        Self([0, 1, 2].map(|k| {
-            let limit = self.0[k].or(table.limits[k])?;
-            let guarded = predicted.filter(|_| table.is_guarded);
-            let guard = guarded.map_or(0.0, |of| of.range[k][1].hypot(declared[k]) - of.rms[k]);
-            Some((limit - guard).max(0.0))
-        }))
+        let guarded = predicted.filter(|_| table.is_guarded);
+        let guard =
+            |k: usize| guarded.map_or(0.0, |of| of.range[k][1].hypot(declared[k]) - of.rms[k]);
+        let guards = [0, 1, 2].map(guard);
+        let limit = |k: usize| self.accepted[k].or(table.limits[k]);
+        Self {
+            accepted: [0, 1, 2].map(|k| Some((limit(k)? - guards[k]).max(0.0))),
+            guards,
+        }
     }
 
     /// The refusal of errors in service beyond these limits; where the verdict refuses, also beyond the usual ones.
     pub fn refusal(&self, predicted: &Predicted, verdict: Option<Verdict>) -> Option<Refusal> {
         let is_refused = verdict == Some(Verdict::Refused);
         let usual = |k: usize| is_refused.then_some(LIMITED_MAX * predicted.noise(k));
-        let limit = |k: usize| self.0[k].into_iter().chain(usual(k)).reduce(f64::min);
-        let errors = Self([0, 1, 2].map(limit)).exceeded(predicted.rms);
+        let limit = |k: usize| {
+            self.accepted[k]
+                .into_iter()
+                .chain(usual(k))
+                .reduce(f64::min)
+        };
+        let all = Self {
+            accepted: [0, 1, 2].map(limit),
+            ..*self
+        };
+        let errors = all.exceeded(predicted.rms);
         (!errors.is_empty()).then_some(Refusal::BeyondLimit {
             errors,
             is_in_service: true,
@@ -77,7 +94,7 @@ impl ErrorLimits {
     /// The rms errors (m, m, rad) that are beyond their limits.
     pub fn exceeded(&self, rms: [f64; 3]) -> Vec<Beyond> {
         let beyond = |axis: usize| {
-            let (limit, rms) = (self.0[axis]?, rms[axis]);
+            let (limit, rms) = (self.accepted[axis]?, rms[axis]);
             let axis = &PLANAR[axis];
             (rms > limit).then_some(Beyond { axis, rms, limit })
         };
@@ -91,7 +108,7 @@ mod tests {
 
     #[test]
     fn limits_are_read_with_their_units() {
-        let read = |text: &str| text.parse::<ErrorLimits>().map(|limits| limits.0);
+        let read = |text: &str| text.parse::<ErrorLimits>().map(|limits| limits.accepted);
         assert_eq!(
             read("x=1.5um, rz = 4 urad"),
             Ok([Some(1.5 * 1e-6), None, Some(4.0 * 1e-6)])
@@ -124,7 +141,10 @@ mod tests {
             limits: [Some(1.1e-6), None, Some(1.25e-6)],
             ..CertificateTable::default()
         };
-        let given = ErrorLimits([None, Some(1.5e-6), None]);
+        let given = ErrorLimits {
+            accepted: [None, Some(1.5e-6), None],
+            ..ErrorLimits::default()
+        };
         let refused = |table: &CertificateTable| {
             let limits = given.or(table, Some(&predicted), None);
             let refusal = limits.refusal(&predicted, Some(Verdict::Good));

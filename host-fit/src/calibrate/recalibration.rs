@@ -11,10 +11,10 @@ use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
 use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_calibration::recalibrate::{
-    RecalibrateError, Recalibration, StoredPosterior, recalibrate,
+    RecalibrateError, Recalibration, StoredPosterior, own_logs, recalibrate,
 };
 use hallstage_calibration::words;
-use hallstage_input::axis::PLANAR;
+use hallstage_input::axis::{PLANAR, PROBES};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::update::Change;
@@ -49,6 +49,10 @@ impl Updated {
         change: Change,
         created: Text,
     ) -> Result<Self, RecalibrateError> {
+        let own = own_logs(old, known, &log.dataset);
+        if !own.is_empty() {
+            return Err(RecalibrateError::OwnLog(own));
+        }
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
         let predicted = new.diagnosis.predicted.as_ref();
@@ -113,9 +117,19 @@ impl Updated {
         let as_found = AsFound {
             by_row: by_row(old, before),
             errors: before.errors,
-            table,
+            tables: vec![table, self.gains()],
         };
         (report, as_found)
+    }
+
+    /// The changes of the gains.
+    pub fn gains(&self) -> Table {
+        let mut table = Table::new("Gains", &["change"]);
+        for (probe, (change, error)) in PROBES.iter().zip(self.new.gains) {
+            let change = figure(change * 100.0, "%").with_error(Some(error * 100.0));
+            table.row(format!("Hall {probe}"), [change]);
+        }
+        table
     }
 
     /// What its verdict is about.
@@ -125,7 +139,8 @@ impl Updated {
             diagnosis: &self.new.diagnosis,
             is_field: true,
             errors: Some(&self.new.judgement.errors),
-            limits: self.limits.0,
+            limits: self.limits.accepted,
+            guards: self.limits.guards,
             corrected: None,
             in_service: true,
         }

@@ -6,10 +6,15 @@ use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{Outputs, blob_file, posterior_file};
+use crate::report::result::Report;
+use crate::report::verdict::Subject;
 use clap::Args;
 use hallstage_calibration::judge::Zeros;
-use hallstage_input::log;
-use std::path::PathBuf;
+use hallstage_calibration::recalibrate::StoredPosterior;
+use hallstage_input::log::{self, LogError};
+use hallstage_input::stage::Stage;
+use runtime::ParameterSet;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Arguments of `eval`.
@@ -47,35 +52,26 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         .chain(args.logs.inputs());
     super::check_outputs([args.json.path.as_deref()], Some(&args.report), inputs)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
-    let options = args.logs.options(Evaluation::OPTIONS);
-    let paths = &args.logs.paths;
     let order = EvalOrder {
         zeros: args.delta,
         limit: args.limit,
     };
     // What is known of k and h stands beside the blob.
     let known = posterior_file::read(&set, &args.params).ok().flatten();
-    let blob = (&set, known.as_ref());
-    let evaluation = terminal::timed("evaluation", || {
-        Evaluation::new(blob, &stage, order, paths.len(), |take| {
-            log::read_each(paths, &stage, &options, take)
-        })
-    })?;
+    let evaluation = evaluate((&set, known.as_ref()), &stage, &args.logs, order)?;
     let report = evaluation.report(started.elapsed().as_secs_f64());
     let subject = evaluation.subject();
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &report)?;
-    args.report.add(&mut outputs, || {
-        let what = ("Verification of a calibration", set.serial.as_str());
-        let log_and_stage = (&evaluation.log, &stage);
-        let mut source = args.report.source(what, &args.logs, log_and_stage, subject);
-        let blob = blob_file::to_bytes(&args.params, &set)?;
-        let provenance = &mut source.provenance;
-        provenance.add_bytes(&args.params, &blob, "parameter blob, judged");
-        source.warnings.clone_from(&report.warnings);
-        source.report = Some(&report);
-        Ok(source)
-    })?;
+    let page = (evaluation.title(), subject, args.params.as_path());
+    let judged = (&evaluation, &report);
+    add_page(
+        &args.report,
+        &mut outputs,
+        page,
+        judged,
+        (&args.logs, &stage),
+    )?;
     finish(
         outputs,
         &report.figures.tables(),
@@ -86,4 +82,40 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         Some(why) => Err(HostError::rejected(why)),
         None => Ok(()),
     }
+}
+
+/// Judges a blob, and what is known of it, on logs.
+pub(super) fn evaluate(
+    blob: (&ParameterSet, Option<&StoredPosterior>),
+    stage: &Stage,
+    logs: &Logs,
+    order: EvalOrder,
+) -> Result<Evaluation, LogError> {
+    let options = logs.options(Evaluation::OPTIONS);
+    terminal::timed("evaluation", || {
+        Evaluation::new(blob, stage, order, logs.paths.len(), |take| {
+            log::read_each(&logs.paths, stage, &options, take)
+        })
+    })
+}
+
+/// Adds the page of a blob in this file that was judged, with title and end, if a report is asked for.
+pub(super) fn add_page(
+    to: &ReportArgs,
+    outputs: &mut Outputs,
+    (title, subject, blob): (&'static str, Subject, &Path),
+    (evaluation, report): (&Evaluation, &Report),
+    (logs, stage): (&Logs, &Stage),
+) -> Result<(), HostError> {
+    to.add(outputs, || {
+        let what = (title, report.set.serial.as_str());
+        let mut source = to.source(what, logs, (&evaluation.log, stage), subject);
+        let bytes = blob_file::to_bytes(blob, &report.set)?;
+        let provenance = &mut source.provenance;
+        provenance.add_bytes(blob, &bytes, "parameter blob, judged");
+        source.certificate.clone_from(&evaluation.certificate);
+        source.warnings.clone_from(&report.warnings);
+        source.report = Some(report);
+        Ok(source.html()?)
+    })
 }

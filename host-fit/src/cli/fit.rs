@@ -97,14 +97,14 @@ impl FitJob<'_> {
                 let provenance = &mut source.provenance;
                 provenance.add_bytes(path, &blob, "parameter blob, written");
             }
-            Ok(source)
+            Ok(source.html()?)
         })?;
         if let Some((path, fit)) = kept {
             posterior_file::add_calibration(
                 &mut outputs,
                 path,
                 &fit.set,
-                outcome.known().as_ref(),
+                outcome.known(&log.dataset, &stage).as_ref(),
             )?;
         }
         let mut details = Vec::new();

@@ -1,18 +1,24 @@
 //! `host-fit recalibrate`.
 
 use super::arguments::{Json, Logs, choice};
+use super::eval::{add_page, evaluate};
 use super::report::{ReportArgs, finish};
-use crate::calibrate::Updated;
+use crate::calibrate::{EvalOrder, Updated};
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, blob_file, posterior_file};
 use crate::report::page::CERTIFICATE;
+use crate::report::text::as_text;
+use crate::report::verdict::{End, Subject};
 use clap::Args;
-use hallstage_calibration::recalibrate::RecalibrateError;
+use hallstage_calibration::diagnose::refusal::Refusal;
+use hallstage_calibration::recalibrate::{RecalibrateError, StoredPosterior};
 use hallstage_input::log::ReadOptions;
+use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::update::Change;
-use runtime::ModelKind;
+use runtime::{ModelKind, ParameterSet};
 use std::path::PathBuf;
 
 /// Arguments of `recalibrate`.
@@ -69,7 +75,13 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let log = args.logs.read(&stage, options)?;
     let created = args.report.created.clone().unwrap_or_default();
     let blob = (&old, known.as_ref());
-    let updated = Updated::new(blob, &log, &stage, args.what, created)?;
+    let updated = match Updated::new(blob, &log, &stage, args.what, created) {
+        Ok(updated) => updated,
+        Err(cause) => {
+            as_found(args, blob, &stage, &cause)?;
+            return Err(cause.into());
+        }
+    };
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &updated.figures)?;
     let (set, known) = (&updated.new.set, updated.new.known.as_ref());
@@ -89,14 +101,47 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         source.warnings.clone_from(&updated.warnings);
         source.report = Some(&report);
         source.as_found = Some(as_found);
-        Ok(source)
+        let before = blob.1.map(|known| known.certificate.clone());
+        source.certificate = before.unwrap_or_default();
+        Ok(source.html()?)
     })?;
     if updated.refusal.is_none() {
         posterior_file::add_calibration(&mut outputs, &args.out, set, known)?;
     }
+    terminal::print(&as_text(&[updated.gains()]))?;
     let details = updated.figures.tables();
     finish(outputs, &details, &updated.warnings, &updated.subject())?;
     updated
         .refusal_message()
         .map_or(Ok(()), |why| Err(HostError::rejected(why)))
+}
+
+/// Writes the page of a blob that is not brought up to date: as it was found.
+fn as_found(
+    args: &RecalibrateArgs,
+    blob: (&ParameterSet, Option<&StoredPosterior>),
+    stage: &Stage,
+    cause: &RecalibrateError,
+) -> Result<(), HostError> {
+    if args.report.folder.is_none() {
+        return Ok(());
+    }
+    let evaluation = evaluate(blob, stage, &args.logs, EvalOrder::default())?;
+    let report = evaluation.report(0.0);
+    let refusal = Refusal::NotUpdated(cause.clone());
+    let subject = Subject {
+        end: End::Failed(&refusal),
+        ..evaluation.subject()
+    };
+    let mut outputs = Outputs::default();
+    let page = ("Calibration as found", subject, args.params.as_path());
+    let judged = (&evaluation, &report);
+    add_page(
+        &args.report,
+        &mut outputs,
+        page,
+        judged,
+        (&args.logs, stage),
+    )?;
+    super::wrote(outputs.commit()?)
 }

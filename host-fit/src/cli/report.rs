@@ -62,29 +62,31 @@ impl ReportArgs {
         Source {
             title,
             subject,
-            facts: facts(
-                serial,
-                self.operator.as_deref(),
-                self.created.as_deref(),
-                &self.notes,
-            ),
+            facts: self.facts(serial),
             stage,
             dataset: &log.dataset,
             provenance,
             warnings: words::messages(&log.warnings),
             report: None,
             as_found: None,
+            certificate: String::new(),
         }
     }
 
+    /// What a person says of the run.
+    pub(super) fn facts(&self, serial: &str) -> Vec<[String; 2]> {
+        let (operator, created) = (self.operator.as_deref(), self.created.as_deref());
+        facts(serial, operator, created, &self.notes)
+    }
+
     /// Adds the report to the outputs, if it is asked for.
-    pub(super) fn add<'a>(
+    pub(super) fn add(
         &self,
         outputs: &mut Outputs,
-        source: impl FnOnce() -> Result<Source<'a>, HostError>,
+        html: impl FnOnce() -> Result<String, HostError>,
     ) -> Result<(), HostError> {
         if let (Some(folder), Some(page)) = (&self.folder, self.page()) {
-            let html = source()?.html()?;
+            let html = html()?;
             make_folder(folder)?;
             outputs.add(&page, html.as_bytes())?;
         }

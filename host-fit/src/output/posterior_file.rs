@@ -1,8 +1,7 @@
 //! The posterior of a fit as a file beside its blob: the prior of a recalibration.
 //!
-//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS2` in ASCII, the fields of `Content` in postcard,
-//! the budget in postcard if there is one, and the
-//! SHA-256 of all before it.
+//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS3` in ASCII, the fields of `Content` in postcard,
+//! and the SHA-256 of all before it.
 
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
@@ -17,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8] = b"HALLPOS2";
+const MAGIC: &[u8] = b"HALLPOS3";
 /// Rows of the covariance without and with k and h.
 const ROWS: [usize; 2] = [COUNT, COUNT + 6];
 /// The file has lengths in mm and angles in mrad.
@@ -40,6 +39,11 @@ struct Content {
     triangle: Vec<f64>,
     /// The faults of the log that the calibration is without.
     repaired: Vec<String>,
+    budget: Option<Budget>,
+    /// SHA-256 of the text of each log that the blob was fitted to.
+    logs: Vec<[u8; 32]>,
+    /// The number of its certificate; empty without one.
+    certificate: String,
 }
 
 /// Why there is no posterior.
@@ -148,8 +152,7 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
         covariance,
         noise,
         misfit,
-        repaired,
-        budget,
+        ..
     } = known;
     let rows = 0..covariance.nrows();
     let content = Content {
@@ -158,13 +161,13 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
         drift_mm: noise.drift.map(|m| m * MM_PER_M),
         misfit: *misfit,
         triangle: (rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]))).collect(),
-        repaired: repaired.clone(),
+        repaired: known.repaired.clone(),
+        budget: known.budget.clone(),
+        logs: known.logs.clone(),
+        certificate: known.certificate.clone(),
     };
     // Into memory it does not fail.
     let mut bytes = postcard::to_extend(&content, MAGIC.to_vec()).unwrap_or_default();
-    if let Some(budget) = budget {
-        bytes = postcard::to_extend(budget, bytes).unwrap_or_default();
-    }
     bytes.extend(Sha256::digest(&bytes));
     bytes
 }
@@ -172,19 +175,14 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
 /// The hash of the blob and what is known, or what is wrong.
 fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     let Some(start) = bytes.strip_prefix(MAGIC) else {
-        return Err("it does not begin with HALLPOS2".to_owned());
+        return Err("it does not begin with HALLPOS3".to_owned());
     };
     let parts = start.split_last_chunk::<32>();
     let (content, hash) = parts.ok_or("it is cut")?;
     if Sha256::digest(&bytes[..MAGIC.len() + content.len()])[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let wrong = |error: postcard::Error| error.to_string();
-    let (content, rest): (Content, &[u8]) = postcard::take_from_bytes(content).map_err(wrong)?;
-    let budget: Option<Budget> = match rest {
-        [] => None,
-        rest => Some(postcard::from_bytes(rest).map_err(wrong)?),
-    };
+    let content: Content = postcard::from_bytes(content).map_err(|error| error.to_string())?;
     let triangle = &content.triangle;
     let has_rows = |rows: &usize| triangle.len() == rows * (rows + 1) / 2;
     let rows = ROWS
@@ -199,6 +197,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         white_mm,
         drift_mm,
         misfit,
+        budget,
         ..
     } = content;
     let mut noise = [white_mm, drift_mm].concat().into_iter().chain([misfit]);
@@ -217,6 +216,8 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         misfit,
         repaired: content.repaired,
         budget,
+        logs: content.logs,
+        certificate: content.certificate,
     };
     Ok((content.blob, known))
 }
@@ -250,6 +251,8 @@ mod tests {
             misfit: 1.02,
             repaired: Vec::new(),
             budget: None,
+            logs: vec![[3; 32]],
+            certificate: "7".to_owned(),
         }
     }
 

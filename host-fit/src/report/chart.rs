@@ -124,18 +124,17 @@ fn drawn(mark: &Mark, x: Axis, y: Axis) -> (Tone, &'static str, String) {
     }
 }
 
-/// The ordinate, symmetric, with some room beyond what is shown.
+/// The ordinate, with some room beyond what is shown: symmetric, or from zero where nothing is below zero.
 fn ordinate(marks: &[Mark]) -> Axis {
-    let largest = |mark: &Mark| match mark {
-        Mark::Line(_, points) => points.iter().map(|point| point.1.abs()).fold(0.0, f64::max),
-        Mark::Band(_, ends) => {
-            let ends = ends.iter().map(|end| end.1.abs().max(end.2.abs()));
-            ends.fold(0.0, f64::max)
-        }
-        Mark::Borders(..) => 0.0,
+    let values = |mark: &Mark| match mark {
+        Mark::Line(_, points) => points.iter().map(|point| point.1).collect(),
+        Mark::Band(_, ends) => ends.iter().flat_map(|end| [end.1, end.2]).collect(),
+        Mark::Borders(..) => Vec::new(),
     };
-    let largest = 1.08 * marks.iter().map(largest).fold(1e-6, f64::max);
-    Axis(-largest, largest)
+    let values: Vec<f64> = marks.iter().flat_map(values).collect();
+    let largest = 1.08 * values.iter().fold(1e-6, |most, x| f64::max(most, x.abs()));
+    let is_negative = values.iter().any(|x| *x < 0.0);
+    Axis(if is_negative { -largest } else { 0.0 }, largest)
 }
 
 #[cfg(test)]

@@ -15,16 +15,16 @@ use serde::Serialize;
 pub struct Page<'a> {
     /// Its title.
     pub title: &'static str,
-    /// The number of the certificate; empty without one.
-    pub number: &'a str,
+    /// What tells it from other pages: the number of the certificate, or a number of its own.
+    pub number: String,
     /// Whether a calibration can be used.
     pub verdict: Summary,
     /// Tables that stand beside the verdict.
     pub first: Vec<Table>,
     /// Name and text of the other facts on a certificate.
     pub facts: Vec<[String; 2]>,
-    /// What was found.
-    pub causes: Vec<Cause<'a>>,
+    /// What was found; `None` of a page that is not about a log.
+    pub causes: Option<Vec<Cause<'a>>>,
     /// What the user should know besides.
     pub warnings: &'a [String],
     /// What follows.

@@ -3,6 +3,7 @@
 
 use super::charts::PlottedLog;
 use super::errors::{RowErrors, designed, error_table, to_micro};
+use super::figure::Figure;
 use super::html::{Cause, Page, Section};
 use super::parameters;
 use super::provenance::Provenance;
@@ -13,8 +14,9 @@ use super::trusted::reference;
 use super::verdict::{End, Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::{PoseError, white_noise};
+use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
 use hallstage_calibration::words;
-use hallstage_input::axis::{AXES, Axis, counted, sign};
+use hallstage_input::axis::{AXES, Axis, PLANAR, counted, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::{Stage, TEXTS};
 use hallstage_solver::estimator::model::Model;
@@ -51,6 +53,8 @@ pub struct Source<'a> {
     pub report: Option<&'a Report>,
     /// The calibration before it was brought up to date.
     pub as_found: Option<AsFound>,
+    /// The number of the certificate of the blob that was judged or brought up to date; empty without one.
+    pub certificate: String,
 }
 
 /// A calibration before it was brought up to date.
@@ -60,8 +64,8 @@ pub struct AsFound {
     pub by_row: RowErrors,
     /// Over these.
     pub errors: PoseError,
-    /// Its errors and those of the new calibration, on the log and in service.
-    pub table: Table,
+    /// Its errors and those of the new calibration, on the log and in service; the changes of the gains.
+    pub tables: Vec<Table>,
 }
 
 /// What a person says of a run, in the order of a certificate.
@@ -105,22 +109,31 @@ impl Source<'_> {
             tables: vec![self.provenance.0.clone()],
             ..Section::default()
         });
-        let is_refused = matches!(self.subject.end, End::Failed(_));
-        let is_whole = self.missing().is_empty() && !is_refused;
-        let is_certificate = self.title != CERTIFICATE || is_whole;
         let [number, ..] = &stage.certificate.texts;
-        let title = if is_certificate { self.title } else { REPORT };
+        let (title, number) = match (self.title, self.is_certificate()) {
+            (title, true) => (title, number.clone()),
+            (CERTIFICATE, false) => (REPORT, self.provenance.document(&self.facts)),
+            (title, false) => (title, self.provenance.document(&self.facts)),
+        };
         let page = Page {
             title,
             number,
-            first: self.as_found.iter().map(|of| of.table.clone()).collect(),
+            first: (self.as_found.as_ref()).map_or(Vec::new(), |of| of.tables.clone()),
             verdict: Summary::new(&self.subject),
             facts: self.facts(),
-            causes: Cause::grouped(&self.subject.diagnosis.findings),
+            causes: Some(Cause::grouped(&self.subject.diagnosis.findings)),
             warnings: &self.warnings,
             sections,
         };
         page.html()
+    }
+
+    /// Whether it is a certificate: of a calibration that can be used, with all fields and a number of its own.
+    fn is_certificate(&self) -> bool {
+        self.title == CERTIFICATE
+            && self.subject.end == End::Written
+            && self.subject.diagnosis.verdict != Some(Verdict::Refused)
+            && self.missing().is_empty()
     }
 
     /// What a certificate by ISO/IEC 17025, 7.8 lacks.
@@ -132,20 +145,34 @@ impl Source<'_> {
         let open = placeholders
             .iter()
             .filter_map(|(text, name)| is_open(text).then_some(*name));
-        texts.chain(open).collect()
+        let [number, ..] = &self.stage.certificate.texts;
+        let is_taken = !number.is_empty() && *number == self.certificate;
+        let taken = is_taken.then_some("a number of its own");
+        texts.chain(open).chain(taken).collect()
     }
 
     /// The facts of a certificate besides the verdict: laboratory, operator, date, stage, range of validity.
     fn facts(&self) -> Vec<[String; 2]> {
         let table = &self.stage.certificate;
-        let texts = TEXTS
-            .iter()
-            .zip(&table.texts)
-            .filter(|(_, text)| !text.is_empty());
+        let is_certificate = self.is_certificate();
+        // Only the certificate has its number.
+        let from = usize::from(!is_certificate);
+        let texts = TEXTS[from..].iter().zip(&table.texts[from..]);
+        let texts = texts.filter(|(_, text)| !text.is_empty());
         let texts = texts.map(|(key, text)| [key.replace('_', " "), text.clone()]);
         let mut facts: Vec<[String; 2]> = texts.collect();
         let missing = self.missing();
         let is_begun = !facts.is_empty();
+        if !is_certificate {
+            facts.insert(
+                0,
+                ["number".to_owned(), self.provenance.document(&self.facts)],
+            );
+        }
+        if !self.certificate.is_empty() {
+            let name = "certificate of the calibration as found".to_owned();
+            facts.insert(1, [name, self.certificate.clone()]);
+        }
         facts.extend(self.facts.iter().cloned());
         let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);
         if self.title == CERTIFICATE && is_begun && !missing.is_empty() {
@@ -158,13 +185,7 @@ impl Source<'_> {
             );
         }
         if self.subject.in_service {
-            let rule = match table.is_guarded {
-                true => {
-                    "guarded acceptance (JCGM 106): the limit is less the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
-                }
-                false => "simple acceptance (JCGM 106): rms errors in service at most at the limit",
-            };
-            add("decision rule", rule.to_owned());
+            add("decision rule", self.decision_rule());
         }
         if let Some(Report { set, .. }) = self.report {
             let c = &set.constants;
@@ -192,6 +213,41 @@ impl Source<'_> {
         let what = format!("{}: {rows} rows in {movements}", logs.join(", "));
         add("log", what);
         facts
+    }
+
+    /// The decision rule with its numbers.
+    fn decision_rule(&self) -> String {
+        let Subject { limits, guards, .. } = self.subject;
+        let by_axis = |text: &dyn Fn(usize) -> Option<String>| {
+            let text = |(k, axis): (usize, &Axis)| {
+                Some(format!("{} {} {}", axis.name, text(k)?, sign(axis.micro)))
+            };
+            let texts: Vec<String> = PLANAR.iter().enumerate().filter_map(text).collect();
+            texts.join(", ")
+        };
+        let is_guarded = self.stage.certificate.is_guarded;
+        let limits = by_axis(&|k| {
+            let [accepted, guard] = [limits[k]?, guards[k]].map(|si| si * 1e6);
+            Some(match is_guarded {
+                true => format!("{:.2} - {guard:.2} = {accepted:.2}", accepted + guard),
+                false => format!("{accepted:.2}"),
+            })
+        });
+        let noise = by_axis(&|k| {
+            let noise = self.subject.diagnosis.predicted.as_ref()?.noise(k);
+            Some(format!("{:.2}", LIMITED_MAX * noise * 1e6))
+        });
+        let rule = match (limits.as_str(), is_guarded) {
+            ("", _) => "simple acceptance (JCGM 106)".to_owned(),
+            (limits, false) => format!(
+                "simple acceptance (JCGM 106): rms errors in service at most at the limit: {limits}"
+            ),
+            (limits, true) => format!(
+                "guarded acceptance (JCGM 106): rms errors in service at most at the limit less a guard band: {limits}. The guard \
+                 band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
+            ),
+        };
+        format!("{rule}; and at most {LIMITED_MAX:.2} times the noise of the sensors: {noise}")
     }
 
     /// Temperatures of the log, and how far from the temperature of calibration the errors hold.
@@ -280,9 +336,12 @@ impl Source<'_> {
             tables: vec![Table::from_groups("movements", movements)],
             ..Section::default()
         };
+        // The budget stands on the first page.
+        let mut figures = report.figures.clone();
+        figures.set("budget", Figure::None);
         let more = Section {
             title: "More figures",
-            tables: report.figures.tables(),
+            tables: figures.tables(),
             ..Section::default()
         };
         [on_log, residuals, parameters, movements, more]

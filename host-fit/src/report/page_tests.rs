@@ -5,6 +5,7 @@ use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
+use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_input::dataset::{Movement, Row};
 use hallstage_input::finding::{Finding, Kind, Severity};
@@ -43,6 +44,7 @@ fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {
         is_field: false,
         errors: None,
         limits: [None; 3],
+        guards: [0.0; 3],
         corrected: None,
         in_service: false,
     }
@@ -61,6 +63,7 @@ fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> S
         warnings: Vec::new(),
         report: None,
         as_found: None,
+        certificate: String::new(),
     }
 }
 
@@ -191,4 +194,48 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
     let open = page(&stage);
     assert!(open.contains("<h1>Calibration report</h1>"));
     assert!(open.contains("<td>missing for a certificate</td><td>customer</td>"));
+    // Only the certificate has its number.
+    let foot = |page: &str| page.contains("of\\20 \\22 \\3c \\2f number\\3e ");
+    assert!(foot(&full) && !foot(&refused) && !foot(&open));
+    assert!(open.contains("<td>number</td><td>document "));
+    stage.certificate.texts[2] = "a customer".to_owned();
+    let of = |title, certificate: &str| {
+        let source = Source {
+            title,
+            certificate: certificate.to_owned(),
+            ..source(&stage, &dataset, subject(End::Written, &diagnosis))
+        };
+        source.html().expect("a page")
+    };
+    let judged = of("Verification of a calibration", "B & 6");
+    assert!(!foot(&judged) && judged.contains("<td>B &amp; 6</td>"));
+    assert!(foot(&of(CERTIFICATE, "B & 6")));
+    let again = of(CERTIFICATE, &stage.certificate.texts[0]);
+    assert!(again.contains("a number of its own") && !foot(&again));
+}
+
+#[test]
+fn the_decision_rule_has_limit_guard_band_and_what_is_accepted() {
+    let mut stage = stage();
+    stage.certificate.is_guarded = true;
+    let dataset = shipped(&stage);
+    let predicted = Predicted {
+        rms: [1e-6; 3],
+        ratio: [1.0; 3],
+        range: [[1e-6; 2]; 3],
+    };
+    let diagnosis = Diagnosis {
+        predicted: Some(predicted),
+        ..Diagnosis::default()
+    };
+    let guarded = Subject {
+        limits: [Some(1.25e-6), None, None],
+        guards: [0.25e-6, 0.0, 0.0],
+        in_service: true,
+        ..subject(End::Written, &diagnosis)
+    };
+    let page = source(&stage, &dataset, guarded).html().expect("a page");
+    for part in ["X 1.50 - 0.25 = 1.25 µm", "Rz 1.30 µrad"] {
+        assert!(page.contains(part), "{part}");
+    }
 }

@@ -28,6 +28,15 @@ impl Provenance {
         provenance
     }
 
+    /// The number of a page that is no certificate: a hash of what it is made of, and of these facts.
+    pub fn document(&self, facts: &[[String; 2]]) -> String {
+        let hash = hex(&Sha256::digest(format!(
+            "{:?}",
+            (facts, self.0.cells().rows)
+        )));
+        format!("document {}", &hash[..8])
+    }
+
     /// Adds a row: of a file its SHA-256 in hexadecimal digits too.
     fn add(&mut self, name: impl Into<String>, what: String, sha256: &str) {
         let what = match sha256 {

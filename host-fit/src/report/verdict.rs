@@ -42,15 +42,17 @@ pub struct Subject<'a> {
     pub errors: Option<&'a PoseError>,
     /// The same with poses corrected by the speed and the acceleration of the reference, for a blob with the correction.
     pub corrected: Option<&'a PoseError>,
-    /// Largest rms errors of X, Y, Rz: m, m, rad.
+    /// Largest rms errors of X, Y, Rz, guard bands taken off: m, m, rad.
     pub limits: [Option<f64>; 3],
+    /// These guard bands.
+    pub guards: [f64; 3],
     /// Whether these hold for the errors in service, in place of those on the log. In service a field model has a limit of
     /// its own: the smaller one counts.
     pub in_service: bool,
 }
 
 /// Verdict, errors by axis, and what to do.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// How the page marks it: `good`, `limited` or `refused`.
     pub mark: &'static str,
@@ -97,6 +99,16 @@ impl Summary {
             not_included: budget.map_or(String::new(), |budget| budget.not_included.join(", ")),
             is_remedy: remedy.is_some(),
             next: remedy.unwrap_or_else(|| next(of, verdict).to_owned()),
+        }
+    }
+
+    /// A sentence without figures.
+    pub fn plain(mark: &'static str, word: &'static str, sentence: String) -> Self {
+        Self {
+            mark,
+            word,
+            sentence,
+            ..Self::default()
         }
     }
 
@@ -242,8 +254,8 @@ mod tests {
             verdict,
             predicted: Some(PREDICTED),
             validity: Some(Validity {
-                within_k: 0.34,
-                is_followed: false,
+                within_k: 3.4,
+                is_followed: true,
             }),
             ..Diagnosis::default()
         };
@@ -253,6 +265,7 @@ mod tests {
             is_field,
             errors: Some(&errors),
             limits: [None, Some(0.9e-6), None],
+            guards: [0.0; 3],
             corrected: None,
             in_service,
         })
@@ -266,7 +279,7 @@ mod tests {
         let failed = End::Failed(failed);
         for (end, verdict, is_field, [mark, sentence, next]) in [
             (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
-            (End::Written, good, true, ["good", "within 0.3 K", "eval"]),
+            (End::Written, good, true, ["good", "within 3 K", "eval"]),
             (End::Checked, good, true, ["good", "1.20", "host-fit fit"]),
             (End::Written, limited, true, ["limited", "1.20", "--draw"]),
             (End::Written, limited, false, ["limited", "µm in X", "plan"]),

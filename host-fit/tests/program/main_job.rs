@@ -91,7 +91,7 @@ fn the_report_pages_show_what_was_given_escape_every_text_and_name_no_folder() {
     }
     for (name, title) in [
         ("fit", "Calibration report"),
-        ("eval", "Verification of a calibration"),
+        ("eval", "Errors on the log of a calibration"),
         ("check", "Check of a log"),
     ] {
         let page = bench.text(&format!("{name}/index.html"));

@@ -4,7 +4,7 @@
 use crate::common::{Bench, changed, number, plan, says, stderr};
 
 /// A log with probes A, B, C that read `gains` times as much.
-fn with_gains(log: &str, gains: [f64; 3]) -> String {
+pub fn with_gains(log: &str, gains: [f64; 3]) -> String {
     changed(log, |_, cells| {
         for (code, gain) in cells[HALL_A..].iter_mut().zip(gains) {
             *code = (*code as f64 * gain).round() as i64;
@@ -134,6 +134,14 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     bench.write("turned.csv", turned);
     let parts = ["beyond all that probes drift", "columns, order and signs"];
     refused("old.bin turned.csv --what all", 4, &parts);
+    let parts = ["was fitted to log.csv", "record a new log"];
+    refused("old.bin log.csv --what gains --report found", 4, &parts);
+    // What the auditor then wants is the blob as it was found.
+    let page = bench.text("found/index.html");
+    for part in ["Calibration as found", "was fitted to log.csv", "X rms"] {
+        says(&page, part);
+    }
+    assert!(!page.contains("Calibration certificate"));
     let arguments = "recalibrate old.bin sine.csv --what gain --out old.bin";
     bench.bad(arguments, 2, &["old.bin: also an input"]);
     let arguments = "diff old.bin old.bin --json old.bin.posterior";
@@ -152,10 +160,34 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
 }
 
 #[test]
+fn eval_of_a_fast_log_says_how_fast_it_is_and_is_limited_by_its_errors() {
+    let bench = Bench::new();
+    bench.good("plan --seconds 8 --out run.csv");
+    let late = "--seed 3 --probe-lag-us 0,0,500";
+    bench.good(&format!("simulate --plan run.csv {late} --out log.csv"));
+    bench.good("fit log.csv --out late.bin");
+    for (lag, verdict, severity) in [(late, "limited", "warn"), ("--seed 3", "good", "note")] {
+        bench.good(&format!("simulate --protocol fast {lag} --out fast.csv"));
+        let json = bench.figures("eval late.bin fast.csv");
+        assert_eq!(json["verdict"], verdict, "{}", json["findings"]);
+        let findings = json["findings"].as_array().expect("a list");
+        let motion = findings.iter().find(|found| found["code"] == "motion");
+        let motion = motion.unwrap_or_else(|| panic!("{findings:?}"));
+        assert_eq!(motion["severity"], severity);
+        assert!(number(&motion["value"]) > 0.1, "{motion}");
+        let worst = number(&json["errors"]["rz"]["rmse_urad"]);
+        let noise = number(&json["predicted"]["rz"]["rms_urad"])
+            / number(&json["predicted"]["rz"]["ratio"]);
+        let said = number(&motion["cost"]);
+        assert!(said >= 0.99 * worst / noise, "{said} {worst} {noise}");
+    }
+}
+
+#[test]
 fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit() {
     let bench = bench();
     let own = bench.good("eval old.bin log.csv");
-    says(stderr(&own), "the errors here verify nothing");
+    says(stderr(&own), "the errors there verify nothing");
     let aged = with_gains(&bench.text("log.csv"), [0.998; 3]);
     bench.write("aged.csv", aged);
     let judged = |log: &str, words: &str, code: &str| {
@@ -170,6 +202,6 @@ fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit
     judged("aged.csv", words, "beyond_limit");
     // No cable is blamed.
     bench.good("simulate --plan run.csv --seed 4 --out other.csv");
-    let words = "Is it the blob of this stage?";
+    let words = "A fit to this log has the probes elsewhere";
     assert_eq!(judged("other.csv", words, "other_log"), Some(0));
 }

@@ -317,10 +317,14 @@ impl Diagnosis {
 pub enum BlobUse {
     /// It was recalibrated by the log, with these errors to expect in service.
     Recalibrated(Option<Predicted>),
-    /// It is from another log; zero deviations are refitted or not.
+    /// It is from another log.
     Evaluated {
-        /// Whether they are.
+        /// Whether zero deviations are refitted.
         is_refitted: bool,
+        /// Errors of X, Y, Rz on the log, rms: m, m, rad.
+        errors: [f64; 3],
+        /// The same with the correction for motion, if the blob has one.
+        corrected: Option<[f64; 3]>,
     },
 }
 
@@ -364,7 +368,15 @@ pub fn diagnose_blob(
             Basis::Recalibrated
         }
         BlobUse::Recalibrated(None) => Basis::Blob { is_for_service },
-        BlobUse::Evaluated { is_refitted } => {
+        BlobUse::Evaluated {
+            is_refitted,
+            errors,
+            corrected,
+        } => {
+            let at_work = out.predicted.as_ref().filter(|_| is_for_service);
+            out.findings.extend(
+                at_work.and_then(|of| range::faster(dataset, stage, (errors, corrected), of)),
+            );
             let rezero = temperature::rezero(temperature, dataset, is_refitted);
             out.findings.extend(rezero);
             Basis::Blob { is_for_service }

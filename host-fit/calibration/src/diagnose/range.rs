@@ -2,15 +2,21 @@
 
 use super::limits::SPANS;
 use crate::fit::{Fit, RANGE_MARGIN};
+use crate::judge::predicted::Predicted;
+use crate::judge::verdict::GOOD_MAX;
 use hallstage_input::channel::Channel;
 use hallstage_input::dataset::{Dataset, Row};
-use hallstage_input::finding::{Finding, Kind};
-use hallstage_input::stage::Stage;
-use runtime::ParameterSet;
+use hallstage_input::finding::{Finding, Kind, Severity};
+use hallstage_input::stage::{AxisMotion, Stage};
+use hallstage_solver::estimator::dynamics::ARMS_M;
+use hallstage_solver::estimator::rows::measured_motion;
+use runtime::{CommandedMotion, ParameterSet};
 
 /// The errors of the field model are larger than predicted if the log moves an axis by less than this part of its
 /// declared range.
 const RANGE_MIN: f64 = 0.5;
+/// A log is faster than declared from this many times the declared rms speed or acceleration on.
+const FASTER_MIN: f64 = 1.5;
 
 /// X, Y, Rz, Z, Rx, Ry: m, rad.
 fn pose(row: &Row) -> impl Iterator<Item = f64> {
@@ -36,6 +42,54 @@ pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Findi
             is_scale,
         };
         (is_scale || is_narrow).then(|| Finding::new(kind).with_channel(axis))
+    })
+}
+
+/// A log that moves faster than service does by `[motion]`: the verdict is about the declared motion. The errors on such a
+/// log, as they are and corrected for motion, say what faster service has to expect.
+pub fn faster(
+    dataset: &Dataset,
+    stage: &Stage,
+    (errors, corrected): ([f64; 3], Option<[f64; 3]>),
+    predicted: &Predicted,
+) -> Option<Finding> {
+    let rows = measured_motion(dataset, &vec![true; dataset.rows.len()]);
+    let axes = &stage.motion.axes;
+    let square = |x: f32, axis: usize| (f64::from(x) * ARMS_M[axis]).powi(2);
+    let of_log = |of: &dyn Fn(&CommandedMotion) -> f64| {
+        (rows.iter().map(of).sum::<f64>() / rows.len().max(1) as f64).sqrt()
+    };
+    let declared = |count: usize, of: fn(&AxisMotion) -> f64| {
+        let squares = (0..count).map(|axis| (of(&axes[axis]) * ARMS_M[axis]).powi(2));
+        (squares.sum::<f64>() / count as f64).sqrt()
+    };
+    let speed_m_s = [
+        of_log(&|row| (0..3).map(|k| square(row.velocity[k], k)).sum::<f64>() / 3.0),
+        declared(3, |axis| axis.service_speed_rms),
+    ];
+    let acceleration_m_s2 = [
+        of_log(&|row| (0..6).map(|k| square(row.acceleration[k], k)).sum::<f64>() / 6.0),
+        declared(6, |axis| axis.service_acceleration_rms),
+    ];
+    let is_faster = [speed_m_s, acceleration_m_s2]
+        .iter()
+        .any(|[log, declared]| *log > FASTER_MIN * declared);
+    let worst = |errors: [f64; 3]| {
+        (0..3).fold(0.0, |worst, axis| {
+            f64::max(worst, errors[axis] / predicted.noise(axis))
+        })
+    };
+    let ratio = worst(errors);
+    let kind = Kind::FasterLog {
+        acceleration_m_s2,
+        speed_mm_s: speed_m_s.map(|speed| speed * 1e3),
+        ratio,
+        corrected_ratio: corrected.map(worst),
+    };
+    let found = Finding::new(kind).with_cost(ratio);
+    is_faster.then(|| match ratio > GOOD_MAX {
+        true => found,
+        false => found.with_severity(Severity::Note),
     })
 }
 

@@ -3,6 +3,7 @@
 use crate::fit::FitError;
 use crate::judge::identify::FitFailure;
 use crate::judge::verdict::is_refused;
+use crate::recalibrate::RecalibrateError;
 use hallstage_input::axis::Axis;
 use hallstage_input::finding::{Finding, Severity};
 
@@ -49,7 +50,12 @@ pub enum Refusal {
         factor: f64,
         /// Whether the blob is of the field model.
         is_field: bool,
+        /// The largest difference between the lever arms of the blob and of a fit to the log, m, and between their angles,
+        /// rad; `None` without such a fit.
+        apart: Option<[f64; 2]>,
     },
+    /// A blob cannot be brought up to date by a log.
+    NotUpdated(RecalibrateError),
 }
 
 impl Refusal {
@@ -83,6 +89,12 @@ impl Refusal {
             Self::BeyondLimit { .. } => "beyond_limit",
             Self::Unfinished { .. } => "unfinished",
             Self::OtherLog { .. } => "other_log",
+            Self::NotUpdated(_) => "not_updated",
         }
     }
+}
+
+/// Whether probes that differ so much between two fits, in the lever arms (m) or the angles (rad), do not stand in the same seats.
+pub fn are_elsewhere([lever_m, angle_rad]: [f64; 2]) -> bool {
+    lever_m > 3e-3 || angle_rad > 0.02
 }

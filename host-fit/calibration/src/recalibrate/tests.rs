@@ -1,7 +1,7 @@
 //! On a stage made of physics: how far off it is in service after a change, and after what
 //! recalibration makes of a few seconds.
 
-use super::{Change, RecalibrateError, Recalibration, StoredPosterior, recalibrate};
+use super::{Change, RecalibrateError, Recalibration, StoredPosterior, own_logs, recalibrate};
 use crate::fit::{FitSettings, ModelChoice, fit};
 use crate::plan::run::PlannedRun;
 use crate::service_for_tests::worst_ratio;
@@ -15,6 +15,7 @@ use hallstage_simulate::recording::record;
 use hallstage_simulate::sensors::SensorErrors;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::terms::{PER_PROBE, THETA};
 use nalgebra::Vector3;
 use runtime::parameters::Text;
 use runtime::{ModelKind, MotionCorrection, ParameterSet};
@@ -172,4 +173,62 @@ fn a_log_that_does_not_tell_the_change_is_refused() {
         let refused = old.recalibrated(now, run, change).expect_err("refused");
         assert!(refusal(&refused), "{change:?} {run:?}: {refused}");
     }
+}
+
+#[test]
+fn where_gains_change_no_other_parameter_moves_and_the_posterior_has_its_errors() {
+    let old = Old::new();
+    let now = old.changed(|k, probe| probe.with_gain([1.0, 0.99, 1.0][k]));
+    let new = old.recalibrated(&now, (2.0, ALL_AXES), Change::Gains);
+    let new = new.expect("determined");
+    let of = |set| FieldParameters::from_set(set, &old.stage).expect("a field model");
+    let (before, after) = (of(&old.set), of(&new.set));
+    let errors = |known: &StoredPosterior| known.covariance.diagonal().map(f64::sqrt);
+    let errors = [&old.known, new.known.as_ref().expect("known")].map(errors);
+    let only_gains = before.gain_change(new.gains.map(|(change, _)| change));
+    let values = before.probes.iter().zip(&after.probes);
+    let moved = values.flat_map(|(from, to)| from.iter().zip(to).map(|(from, to)| to - from));
+    for (k, (moved, gains)) in moved.zip(only_gains).enumerate() {
+        // The numbers of a blob are rounded.
+        let rounding = 1e-6 * before.probes.as_flattened()[k].abs() + 1e-3 * errors[0][k];
+        assert!((moved - gains).abs() < rounding, "{k}: {moved} {gains}");
+    }
+    // The gains are within their errors; the others are as unknown as before.
+    for ((change, error), gain) in new.gains.into_iter().zip([1.0, 0.99, 1.0]) {
+        assert!(
+            (change + 1.0 - gain).abs() < 4.0 * error,
+            "{change} {error}"
+        );
+    }
+    let theta = (0..3).map(|probe| probe * PER_PROBE + THETA);
+    for k in theta {
+        let part = errors[1][k] / errors[0][k];
+        assert!((0.9..1.1).contains(&part), "{k}: {part}");
+    }
+}
+
+#[test]
+fn a_log_is_no_evidence_if_any_fit_before_has_used_it() {
+    let old = Old::new();
+    let dataset = |hashes: &[u8]| {
+        let mut dataset = Dataset::default();
+        for hash in hashes {
+            dataset.end_log(format!("{hash}.csv"));
+            dataset.logs.last_mut().expect("a log").sha256 = [*hash; 32];
+        }
+        dataset
+    };
+    let own = |known: Option<&StoredPosterior>, hashes: &[u8]| {
+        let set = ParameterSet {
+            logs_sha256: [1; 32],
+            ..old.set.clone()
+        };
+        own_logs(&set, known, &dataset(hashes))
+    };
+    assert_eq!(own(None, &[1, 2]), ["1.csv"]);
+    assert!(own(None, &[3]).is_empty());
+    let known = old.known.with_log(&dataset(&[1, 2]), &old.stage);
+    let known = known.with_log(&dataset(&[3]), &old.stage);
+    assert_eq!(own(Some(&known), &[2, 4, 3]), ["2.csv", "3.csv"]);
+    assert!(own(Some(&known), &[4]).is_empty());
 }

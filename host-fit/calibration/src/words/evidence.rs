@@ -142,6 +142,10 @@ pub(super) fn evidence(found: &Finding) -> String {
             };
             format!("in the motion that [motion] in stage.toml declares for service, errors are {ratio:.2} times the noise floor{corrected}. Uncorrected errors are good up to {acceleration_m_s2:.2} m/s² and {speed_mm_s:.1} mm/s rms. Probes A, B, C are read {a:.0}, {b:.0}, {c:.0} µs after the middle probe{known}")
         }
+        Kind::FasterLog { acceleration_m_s2: [a, declared_a], speed_mm_s: [v, declared_v], ratio, corrected_ratio } => {
+            let corrected = corrected_ratio.map_or(String::new(), |ratio| format!(", and {ratio:.2} times with the correction by speed and acceleration"));
+            format!("the log moves faster than [motion] in stage.toml declares for service: {a:.2} m/s² and {v:.1} mm/s rms, declared {declared_a:.3} m/s² and {declared_v:.1} mm/s. Errors on it are {ratio:.2} times the noise floor{corrected}")
+        }
         Kind::BeyondRange { rows, of } => {
             format!("{rows} of {of} rows are beyond the range of the logs that the parameter blob was fitted to, so the blob extrapolates")
         }

@@ -3,7 +3,7 @@
 use super::causes::mistake_remedy;
 use super::evidence::{SENSORS, evidence};
 use super::sentence;
-use hallstage_input::finding::{Code, Finding, Kind, Place};
+use hallstage_input::finding::{Code, Finding, Kind, Place, Severity};
 
 /// The message.
 pub fn message(found: &Finding) -> String {
@@ -63,6 +63,8 @@ pub fn remedy(found: &Finding) -> String {
         }
         Kind::Mistake { code, causes, may_be_magnets, .. } => return mistake_remedy(*code, causes, *may_be_magnets),
         Kind::InMotion { shows_acceleration: false, .. } => "record the run of host-fit plan, whose second tone shows it, or evaluate on your fastest motion",
+        Kind::FasterLog { .. } if found.severity == Severity::Note => "",
+        Kind::FasterLog { .. } => "the verdict is at best limited; for service that moves so, declare its motion in [motion], and apply the correction (runtime/README.md)",
         Kind::Resets { .. } => "log resets as movements",
         Kind::SingleRows { .. } => "check the movement column",
         Kind::GroupNoise { .. } => "check what the channels share: supply, ground, converter, and magnetic fields nearby",

@@ -1,7 +1,7 @@
 //! Why a calibration is not to be used.
 
 use super::{paragraph, sentence};
-use crate::diagnose::refusal::{Beyond, Refusal};
+use crate::diagnose::refusal::{Beyond, Refusal, are_elsewhere};
 use hallstage_input::axis::sign;
 use hallstage_input::finding::{Finding, Severity};
 use serde::ser::SerializeStruct;
@@ -71,6 +71,7 @@ pub fn refusal(refusal: &Refusal, findings: &[Finding]) -> String {
             worst,
             factor,
             is_field,
+            apart,
         } => {
             let (axis, unit) = (worst.axis.name, sign(worst.axis.micro));
             let [error, own] = [worst.rms, worst.limit].map(|x| x * 1e6);
@@ -79,17 +80,27 @@ pub fn refusal(refusal: &Refusal, findings: &[Finding]) -> String {
             );
             let refused = paragraph(findings, Severity::Refuse);
             let has_warning = findings.iter().any(|f| f.severity == Severity::Warn);
-            let remedy = match (refused.as_str(), has_warning, is_field) {
-                ("", true, _) => "If it is, the log has the faults above.",
-                ("", false, true) => {
-                    "If it is, and channels and scales are right, bring it up to date with host-fit recalibrate."
+            if !refused.is_empty() {
+                return format!("{what} If it is: {refused}");
+            }
+            let remedy = match (has_warning, apart) {
+                (_, Some([lever_m, angle_rad])) if are_elsewhere([*lever_m, *angle_rad]) => {
+                    let (mm, mrad) = (lever_m * 1e3, angle_rad * 1e3);
+                    format!("A fit to this log has the probes elsewhere, by up to {mm:.1} mm in the lever arms and {mrad:.1} mrad in the angles: probes do not age so. If it is, they were seated anew: fit again.")
                 }
-                ("", false, false) => {
-                    "If it is, and channels and scales are right, take the field model, with a log of all six axes moving at once."
+                (true, _) => "If it is, the log has the faults above.".to_owned(),
+                (false, Some(_)) if *is_field => {
+                    "A fit to this log has the probes in the same places: if it is, bring it up to date with host-fit recalibrate.".to_owned()
                 }
-                (refused, ..) => return format!("{what} If it is: {refused}"),
+                _ => "If it is, and channels and scales are right, fit again, with a log of all six axes moving at once.".to_owned(),
             };
             format!("{what} {remedy}")
+        }
+        Refusal::NotUpdated(error) => {
+            format!(
+                "The calibration was not brought up to date: {}",
+                sentence_after_colon(&error.to_string())
+            )
         }
     }
 }

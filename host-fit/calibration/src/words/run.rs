@@ -51,6 +51,11 @@ impl Display for RecalibrateError {
             Self::NothingKnown => {
                 f.write_str("without the old posterior nothing but gains can be found: fit again")
             }
+            Self::OwnLog(logs) => write!(
+                f,
+                "the blob was fitted to {}, which shows no change since: record a new log",
+                logs.join(", ")
+            ),
             Self::NoTemperature(what) => write!(
                 f,
                 "{what} has no temperatures: name their columns in [temperature] of the stage file, and fit a cold and a warm log together"

@@ -24,16 +24,12 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         Some(_) => "; errors on the log include its faults, the calibration is free of them",
         None => "",
     };
-    let reaches = diagnosis
+    let followed = diagnosis
         .validity
-        .filter(|validity| validity.within_k > 0.0);
-    let within = reaches.map_or(String::new(), |validity| {
-        let (digits, logged) = match validity.is_followed {
-            true => (0, ""),
-            false => (1, ", which was not logged"),
-        };
+        .filter(|validity| validity.is_followed && validity.within_k > 0.0);
+    let within = followed.map_or(String::new(), |validity| {
         let within_k = validity.within_k;
-        format!("; good within {within_k:.digits$} K of the temperature of calibration{logged}")
+        format!("; good within {within_k:.0} K of the temperature of calibration")
     });
     let moves = diagnosis.motion.filter(|motion| motion.speed_m_s > 0.0);
     let motion = moves.map_or(String::new(), |motion| format!("; {}", up_to(&motion)));
@@ -42,8 +38,13 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
     )
 }
 
-/// A blob is judged on its own log.
-pub const OWN_LOG: &str = "The parameter blob was fitted to this log: the errors here verify nothing. Judge it on another log.";
+/// A blob is judged on logs that it was fitted to.
+pub fn own_logs(names: &[String]) -> String {
+    let names = names.join(", ");
+    format!(
+        "The parameter blob was fitted to {names}: the errors there verify nothing. Judge it on another log."
+    )
+}
 
 /// The largest motion with good errors.
 pub fn up_to(motion: &InMotion) -> String {

@@ -229,6 +229,9 @@ kinds! {
     /// worst axis, without and with the correction, the rms motion up to which they are good, and the lags of A, B, C
     /// behind the middle probe.
     InMotion { ratio: f64, corrected_ratio: f64, acceleration_m_s2: f64, speed_mm_s: f64, shows_acceleration: bool, lag_us: [f64; 3] } => Code::Motion, *acceleration_m_s2, "m/s2";
+    /// The motion of a log and the motion that `[motion]` declares for service, rms over the axes, and the errors on the log
+    /// over the noise floor of the worst axis, without and with the correction.
+    FasterLog { acceleration_m_s2: [f64; 2], speed_mm_s: [f64; 2], ratio: f64, corrected_ratio: Option<f64> } => Code::Motion, acceleration_m_s2[0], "m/s2";
     /// Rows beyond the calibrated range of a blob.
     BeyondRange { rows: usize, of: usize } => Code::OutOfRange, *rows as f64, "rows";
     /// k or h of Hall A, B, C with their standard errors, %/K, and where they are from.

@@ -111,8 +111,8 @@ impl<'a> Lines<'a> {
         self.is_whole && self.at == self.buffer.len() && !self.buffer.last().is_some_and(is_break)
     }
 
-    pub(super) fn into_hash(self) -> Option<Sha256> {
-        self.text.into_hash()
+    pub(super) fn into_hashes(self) -> Vec<Sha256> {
+        self.text.into_hashes()
     }
 
     /// Reads on, and drops the lines that were taken.

@@ -49,7 +49,7 @@ pub struct LogEnd {
     pub has_reference: bool,
     /// Its warnings.
     pub warnings: Vec<Finding>,
-    pub(super) hash: Option<Sha256>,
+    pub(super) hashes: Vec<Sha256>,
 }
 
 impl<'a> LogRows<'a> {
@@ -206,7 +206,7 @@ impl<'a> LogRows<'a> {
             skipped_rows,
             has_reference: columns.reference.is_some(),
             warnings,
-            hash: self.table.lines.into_hash(),
+            hashes: self.table.lines.into_hashes(),
             path: head.path,
         })
     }

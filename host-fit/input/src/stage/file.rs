@@ -62,14 +62,15 @@ impl Stage {
         let document = &Document::parse(text, path)?;
         let probes = designed_probes(document)?;
         let capacitive = code_scale(document, "capacitive")?;
-        let uncertainty = uncertainty::uncertainty(document)?;
         let servo_period_s = document.required("servo", "period_s", PERIODS_S, "s")?;
+        let interferometer = beams::interferometer(document)?;
+        let uncertainty = uncertainty::uncertainty(document, &interferometer)?;
         let stage = Self {
             probes,
             hall: code_scale(document, "hall")?,
             capacitive_probes_m: capacitive_probes(document, &capacitive)?,
             capacitive,
-            interferometer: beams::interferometer(document)?,
+            interferometer,
             reset_sd: reset_sd(document)?,
             latency_s: latency_s(document)?,
             servo_period_s,

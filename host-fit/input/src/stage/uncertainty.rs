@@ -9,6 +9,7 @@
 
 use super::document::Document;
 use super::error::StageError;
+use super::interferometer::Interferometer;
 
 /// Least uncertainty that makes sense, in any unit.
 const LEAST: f64 = 1e-12;
@@ -81,9 +82,13 @@ impl Uncertainty {
     }
 }
 
-/// The table, with defaults for missing keys.
-pub(super) fn uncertainty(document: &Document<'_>) -> Result<Uncertainty, StageError> {
+/// The table, with defaults for missing keys. Beams at places that nobody declared have no default: nothing is known of them.
+pub(super) fn uncertainty(
+    document: &Document<'_>,
+    beams: &Interferometer,
+) -> Result<Uncertainty, StageError> {
     let mut out = TABLE.map(|(.., default)| default);
+    out[Input::BeamPlaces as usize].take_if(|_| !beams.has_places());
     for (value, (key, unit, most, _)) in out.iter_mut().zip(TABLE) {
         let given = document.number("uncertainty", key, (LEAST, most), unit)?;
         *value = given.or(*value);
@@ -134,6 +139,16 @@ mod tests {
                 assert_eq!(found.get(other), want, "{key}");
             }
         }
+    }
+
+    #[test]
+    fn beams_without_declared_places_have_no_uncertainty() {
+        let declared = SOUND.replace("[servo]", "x = { z_m = 0.01 }\n[servo]");
+        let of = |text: &str| {
+            let stage = Stage::from_toml(text, "stage.toml".as_ref()).expect("sound");
+            stage.uncertainty.get(Input::BeamPlaces)
+        };
+        assert_eq!((of(SOUND), of(&declared)), (None, Some(0.3e-3)));
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! The prior is normal about the old parameters. Its covariance is the old posterior's plus what
 //! may have changed since, written as L L': the parameters are p = p_old + L x with x standard
 //! normal. This needs no inverse, so a change may be of one parameter or of all, with or without
-//! an old posterior. The lags of the reference and of the probes, and what
+//! an old posterior. Where only gains change, the log moves only the gains; the covariance then has what the errors of the
+//! other parameters make of the gains. The lags of the reference and of the probes, and what
 //! acceleration adds, are unknowns of every log.
 
 use super::dynamics::{Dynamics, MotionFit, PER_ACCELERATION, lag_prior};
@@ -202,15 +203,31 @@ pub fn update(
         // The errors of the temperatures belong to this log only. Their column is the last before the columns of motion.
         lasting.column_mut(changes - MOTION_COLUMNS - 1).fill(0.0);
     }
-    let inverse = unknowns
-        .factor(&solved.normal)
-        .map(|factor| factor.inverse());
-    let all = inverse.map(|inverse| &lasting * inverse * lasting.transpose());
+    let prior = unknowns.prior_squares(&solved.x);
+    let chi_squared = solved.normal.chi_squared() + prior;
+    let known = covariance.map_or(0, DMatrix::nrows);
+    let mut open = None;
+    if matches!(change, Change::Gain | Change::Gains) {
+        open = Some(unknowns.basis.columns(0, known).into_owned());
+        unknowns.basis.columns_mut(0, known).fill(0.0);
+        lasting.clone_from(&unknowns.basis);
+        let (x, offsets) = (DVector::zeros(changes), solved.point.offsets);
+        let again = gauss_newton::solve(&equations, &unknowns, x, offsets, Limits::CLOSE);
+        solved = again.ok_or(FieldFitError::Singular)?;
+    }
+    let inverse = unknowns.factor(&solved.normal);
+    let inverse = inverse.ok_or(FieldFitError::Singular)?.inverse();
+    let mut all = &lasting * inverse * lasting.transpose();
+    if let Some(open) = open {
+        // Errors e of the other parameters leave e - C N e: the gains take up what the log sees of them.
+        let curvature = |i, j| solved.normal.curvature(i, j);
+        let curvature = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, curvature);
+        let left = &open - &all * (curvature * &open);
+        all += &left * left.transpose();
+    }
     solved.point.values = &unknowns.origin + &lasting * &solved.x;
     let parameters = equations.parameters(&solved.point);
-    let prior = unknowns.prior_squares(&solved.x);
     let noise = equations.noise;
-    let all = all.ok_or(FieldFitError::Singular)?;
     let posterior = Posterior::new(&all, &parameters, &noise);
     Ok(Update {
         posterior: match covariance.is_some_and(|covariance| covariance.nrows() > COUNT) {
@@ -219,7 +236,7 @@ pub fn update(
         },
         parameters,
         noise,
-        chi_squared: solved.normal.chi_squared() + prior,
+        chi_squared,
         prior,
         changes,
         residuals: 3 * (rows.blocks.len() - rows.movements.len()),

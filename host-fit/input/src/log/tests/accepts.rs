@@ -196,6 +196,8 @@ fn several_logs_are_one_dataset_hashed_in_their_order() {
         .expect("sound")
         .dataset;
     assert_ne!(turned.sha256, dataset.sha256);
+    let own: [u8; 32] = Sha256::digest(other.as_bytes()).into();
+    assert_eq!([dataset.logs[1].sha256, turned.logs[0].sha256], [own; 2]);
 }
 
 #[test]
