@@ -87,31 +87,22 @@ pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
     };
     let (of_a, of_b) = (range_of(a), range_of(b));
     let range_si: [f64; 6] = from_fn(|k| f64::from(of_a[k].min(of_b[k])));
-    let codes = Codes::new(a)?;
-    let decoders = [a.decoder(), b.decoder()];
     // By axis: sum, sum of squares, largest magnitude.
     let mut sums = [[0.0f64; 3]; 6];
     let (mut poses, mut refused) = (0u32, 0u32);
-    for place in 0..LEVELS.len().pow(6) {
-        let level = |axis: usize| LEVELS[place / LEVELS.len().pow(axis as u32) % LEVELS.len()];
-        let frame = codes.at(from_fn(|axis| level(axis) * range_si[axis]));
-        let read = |decoder: &runtime::AnyDecoder| {
-            let reading = decoder.decode(&frame, &PlanarPose::ZERO);
-            let planar = reading.planar()?.to_array();
-            Some([planar, reading.vertical()?.to_array()].concat())
-        };
-        let [Some(from), Some(to)] = [read(&decoders[0]), read(&decoders[1])] else {
+    on_grid(&[a, b], range_si, |read| {
+        let Some([from, to]) = read else {
             refused += 1;
-            continue;
+            return;
         };
         poses += 1;
         for (axis, [sum, squares, peak]) in sums.iter_mut().enumerate() {
-            let difference = f64::from(to[axis]) - f64::from(from[axis]);
+            let difference = to[axis] - from[axis];
             *sum += difference;
             *squares += difference * difference;
             *peak = peak.max(difference.abs());
         }
-    }
+    })?;
     let n = f64::from(poses.max(1));
     let difference = |(axis, [sum, squares, peak]): (&Axis, [f64; 3])| {
         let micro = |x: f64| micro(axis, x);
@@ -127,6 +118,29 @@ pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<Group> {
         "range" => Group(AXES.iter().zip(range_si).map(range).collect()),
         "axes" => Group(AXES.iter().zip(sums).map(difference).collect()),
     })
+}
+
+/// Calls `take` for each pose of a grid up to these ends: with X, Y, Rz, Z, Rx, Ry as each blob decodes the codes of the first
+/// blob there, or with `None` where a blob does not decode them. `None` where the geometry of the first blob cannot be inverted.
+pub fn on_grid(
+    sets: &[&ParameterSet],
+    range_si: [f64; 6],
+    mut take: impl FnMut(Option<&[[f64; 6]]>),
+) -> Option<()> {
+    let codes = Codes::new(sets.first()?)?;
+    let decoders: Vec<_> = sets.iter().map(|set| set.decoder()).collect();
+    for place in 0..LEVELS.len().pow(6) {
+        let level = |axis: usize| LEVELS[place / LEVELS.len().pow(axis as u32) % LEVELS.len()];
+        let frame = codes.at(from_fn(|axis| level(axis) * range_si[axis]));
+        let read = decoders.iter().map(|decoder| {
+            let reading = decoder.decode(&frame, &PlanarPose::ZERO);
+            let ([x, y, rz], [z, rx, ry]) =
+                (reading.planar()?.to_array(), reading.vertical()?.to_array());
+            Some([x, y, rz, z, rx, ry].map(f64::from))
+        });
+        take(read.collect::<Option<Vec<_>>>().as_deref());
+    }
+    Some(())
 }
 
 /// The answer in one line, from what [`pose_difference`] found.

@@ -12,6 +12,7 @@
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
 //! | [`diff`] | what changed between two blobs |
 //! | [`scope`] | sensors as traces in a terminal |
+//! | [`trend`] | how the calibrations of a stage change |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, updated |
 //! | [`join`](mod@join) | records of the sensors and of the reference with their clocks, made into a log |
 //! | [`cli`] | the commands |
@@ -30,3 +31,4 @@ pub mod join;
 pub mod output;
 pub mod report;
 pub mod scope;
+pub mod trend;

@@ -30,6 +30,7 @@ mod shell;
 mod simulate;
 mod terminal;
 mod threads;
+mod trend;
 mod update;
 
 pub use fit_options::FitOptions;
@@ -113,6 +114,8 @@ commands! {
     Inspect(inspect::InspectArgs) => inspect::run,
     /// Show what changed between two parameter blobs, and by how much their poses differ.
     Diff(diff::DiffArgs) => diff::run,
+    /// Show how the calibrations of a stage change, and when their errors reach a limit.
+    Trend(trend::TrendArgs) => trend::run,
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
     /// Show the sensors of a log in the terminal, also while the log grows.

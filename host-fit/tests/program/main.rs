@@ -18,3 +18,4 @@ mod robust;
 mod searches;
 mod temperature;
 mod terminal;
+mod trend;
