@@ -103,7 +103,7 @@ error = (np.column_stack([decoded["x_m"], decoded["y_m"], decoded["rz_rad"]]) - 
 print("rms in service, µm, µm, µrad:", np.sqrt((error**2).mean(axis=0)).round(3))
 
 # %% Uncertainty of each pose: by the parameters and by the noise of the probes
-uncertainty = decoder.uncertainty(service.hall, service.caps) * 1e6
+uncertainty = decoder.uncertainty(service) * 1e6
 share = (np.abs(error) < 1.96 * uncertainty).mean(axis=0)
 print("share of the errors within 1.96 standard uncertainties:", share.round(3))
 

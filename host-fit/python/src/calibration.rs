@@ -26,6 +26,7 @@ use host_fit::report::page::CERTIFICATE;
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::update::Change;
+use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList};
@@ -220,18 +221,38 @@ impl Calibration {
         self.known().parameters(py)
     }
 
-    /// Covariance of the parameters that have a standard error, float64, (k, k), in their units; `.labels` are
-    /// their names. Of the field model the posterior under the noise of the log; of others the sandwich over
-    /// movements.
+    /// Names of the parameters that have a standard error, in the order of `covariance`.
     #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.known().labelled(py, |matrix, i, j| matrix[(i, j)])
+    fn names(&self) -> PyResult<Vec<String>> {
+        self.known().names()
+    }
+
+    /// Covariance of the parameters of `names`, float64, (k, k), in their units. Of the field model the posterior
+    /// under the noise of the log; of others the sandwich over movements.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.known().matrix(py, |matrix, i, j| matrix[(i, j)])
+    }
+
+    /// The same as a `pandas.DataFrame` with the names of its rows and columns.
+    fn covariance_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let names = self.names()?;
+        let options = [("index", &names), ("columns", &names)].into_py_dict(py)?;
+        let pandas = py.import("pandas")?;
+        pandas.call_method("DataFrame", (self.covariance(py)?,), Some(&options))
+    }
+
+    /// The parameters as a `pandas.DataFrame`, a row for each by name: `value`, `std`, `unit`.
+    fn to_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.parameters(py)?.values();
+        let frame = py.import("pandas")?.call_method1("DataFrame", (rows,))?;
+        frame.call_method1("set_index", ("name",))
     }
 
     /// Correlations of the same parameters, from -1 to 1.
     #[getter]
-    fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.known().labelled(py, |matrix, i, j| match i == j {
+    fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.known().matrix(py, |matrix, i, j| match i == j {
             true => 1.0,
             false => matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt(),
         })

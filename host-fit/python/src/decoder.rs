@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use runtime::frame::MISSING_CODE;
 use runtime::{
-    AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading,
+    AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading, Status,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -69,10 +69,10 @@ impl Decoder {
     }
 
     /// The pose of each row, as a structured array, (n,): `x_m`, `y_m`, `rz_rad`, `z_m`, `rx_rad`, `ry_rad` in
-    /// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). What is invalid is 0, or
-    /// the last valid pose for at most `hold` rows.
+    /// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). An invalid pose is NaN, with
+    /// `invalid="zero"` 0 as on the controller, or the last valid pose for at most `hold` rows.
     ///
-    /// Give codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers, (n, 3), a row every
+    /// Give codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers or NaN, (n, 3), a row every
     /// servo period; `mount`, `body`: temperatures, degC, (n,), NaN where there is none. int32 in C order
     /// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
     /// shows as missed frames.
@@ -84,7 +84,8 @@ impl Decoder {
     /// Raises `ValueError` with the name of an argument of wrong shape or dtype, of a motion without the other, and of one
     /// that is not finite or meets parameters without a motion correction.
     #[pyo3(signature = (
-        log = None, *, hall = None, caps = None, mount = None, body = None, velocity = None, acceleration = None, hold = 0
+        log = None, *, hall = None, caps = None, mount = None, body = None, velocity = None, acceleration = None, hold = 0,
+        invalid = "nan"
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -101,23 +102,24 @@ impl Decoder {
         velocity: Option<&Bound<'py, PyAny>>,
         acceleration: Option<&Bound<'py, PyAny>>,
         hold: u16,
+        invalid: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let is_nan = match invalid {
+            "nan" => true,
+            "zero" => false,
+            _ => return Err(wrong("invalid", "\"nan\" or \"zero\" is needed")),
+        };
         let on_invalid = match hold {
             0 => OnInvalid::Zero,
             ticks => OnInvalid::Hold { ticks },
         };
         let commanded = Commanded::new(self.set.motion_correction, velocity, acceleration)?;
-        let (hall, caps) = match (log, hall, caps) {
-            (Some(log), None, None) if mount.is_none() && body.is_none() => {
-                let words = self.statuses(py, log.get(), on_invalid)?;
-                return records(py, words, ("log", commanded));
+        let (hall, caps) = match Given::new(log, hall, caps, mount, body)? {
+            Given::Log(log) => {
+                let words = self.statuses(py, log, on_invalid)?;
+                return records(py, words, ("log", commanded), is_nan);
             }
-            (None, Some(hall), Some(caps)) => (hall, caps),
-            (Some(_), ..) => {
-                return Err(wrong("log", "a log has its codes and temperatures itself"));
-            }
-            (None, None, _) => return Err(wrong("hall", "is missing")),
-            (None, _, None) => return Err(wrong("caps", "is missing")),
+            Given::Codes(hall, caps) => (hall, caps),
         };
         let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
         let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
@@ -141,21 +143,26 @@ impl Decoder {
             });
             py.check_signals()?;
         }
-        records(py, words, ("hall", commanded))
+        records(py, words, ("hall", commanded), is_nan)
     }
 
     /// Standard uncertainty of X, Y, Rz of each row, float64, (n, 3), m, m, rad: by the parameters and by the
-    /// noise of the probes together, at the pose that is decoded; 0 where none is. With `whole` by all sources of the
-    /// budget. Other arguments as of a call.
+    /// noise of the probes together, at the pose that is decoded; NaN where none is. With `whole` by all sources of the
+    /// budget. Codes and temperatures, or a `log`, as for a call.
     ///
     /// Raises `ValueError` without a posterior: of other models than the field model, or where
     /// `params.bin.posterior` does not stand beside the blob; with `whole` also without a budget in it.
-    #[pyo3(signature = (hall, caps, *, mount = None, body = None, whole = false))]
+    #[pyo3(signature = (log = None, *, hall = None, caps = None, mount = None, body = None, whole = false))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each is named where it is called"
+    )]
     fn uncertainty<'py>(
         &self,
         py: Python<'py>,
-        hall: &Bound<'py, PyAny>,
-        caps: &Bound<'py, PyAny>,
+        log: Option<&Bound<'py, Log>>,
+        hall: Option<&Bound<'py, PyAny>>,
+        caps: Option<&Bound<'py, PyAny>>,
         mount: Option<&Bound<'py, PyAny>>,
         body: Option<&Bound<'py, PyAny>>,
         whole: bool,
@@ -164,7 +171,29 @@ impl Decoder {
         if whole && known.budget.is_none() {
             return Err(wrong("whole", "the posterior has no budget; fit again"));
         }
-        let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
+        let at = |reading: Reading| {
+            if reading.status.any(Status::PLANAR_INVALID) {
+                return [f64::NAN; 3];
+            }
+            let all = known.at(&reading);
+            [0, 1, 2].map(|k| all[if whole { 3 + k } else { k }])
+        };
+        let given = match Given::new(log, hall, caps, mount, body)? {
+            Given::Log(log) => {
+                let decoder = &self.decoder;
+                let found = work::run(py, || {
+                    let mut readings = Vec::new();
+                    let read = log.read_for(ReadOptions::DECODE, |_, row| {
+                        readings.push(row.row.frame.decode(decoder, &PlanarPose::ZERO));
+                    });
+                    read.map(|_: LogReading| readings.into_par_iter().map(at).collect::<Vec<_>>())
+                })?;
+                let found = found.map_err(|error| log_error(py, &error))?;
+                return crate::log::rows_of_three(py, found);
+            }
+            Given::Codes(hall, caps) => (hall, caps),
+        };
+        let (hall, caps) = (codes("hall", given.0)?, codes("caps", given.1)?);
         let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
         let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
         same_rows("caps", caps.len(), "hall", hall.len())?;
@@ -175,14 +204,9 @@ impl Decoder {
             temperature: temperature.as_deref(),
             first: 0,
         };
-        let words_at = |row: usize| {
-            let reading = self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO);
-            let all = known.at(&reading);
-            [0, 1, 2].map(|k| all[if whole { 3 + k } else { k }])
-        };
-        let found: Vec<[f64; 3]> = work::run(py, || {
-            (0..hall.len()).into_par_iter().map(words_at).collect()
-        })?;
+        let of_row = |row: usize| at(self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO));
+        let found: Vec<[f64; 3]> =
+            work::run(py, || (0..hall.len()).into_par_iter().map(of_row).collect())?;
         crate::log::rows_of_three(py, found)
     }
 
@@ -209,6 +233,32 @@ impl Decoder {
         match serial.as_str() {
             "" => format!("<Decoder, {model}>"),
             serial => format!("<Decoder of {serial}, {model}>"),
+        }
+    }
+}
+
+/// The rows to decode.
+enum Given<'a, 'py> {
+    Log(&'a Log),
+    Codes(&'a Bound<'py, PyAny>, &'a Bound<'py, PyAny>),
+}
+
+impl<'a, 'py> Given<'a, 'py> {
+    fn new(
+        log: Option<&'a Bound<'py, Log>>,
+        hall: Option<&'a Bound<'py, PyAny>>,
+        caps: Option<&'a Bound<'py, PyAny>>,
+        mount: Option<&Bound<'py, PyAny>>,
+        body: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        match (log, hall, caps) {
+            (Some(log), None, None) if mount.is_none() && body.is_none() => {
+                Ok(Self::Log(log.get()))
+            }
+            (None, Some(hall), Some(caps)) => Ok(Self::Codes(hall, caps)),
+            (Some(_), ..) => Err(wrong("log", "a log has its codes and temperatures itself")),
+            (None, None, _) => Err(wrong("hall", "is missing")),
+            (None, _, None) => Err(wrong("caps", "is missing")),
         }
     }
 }
@@ -336,14 +386,31 @@ fn temperatures(
     Ok(Some(all))
 }
 
+/// Writes NaN in place of a pose that is invalid and not held.
+fn hide_invalid([x, y, rz, z, rx, ry, status]: &mut [u32; WORDS]) {
+    let status = Status::from_bits(*status);
+    let is_hidden = |invalid, held| status.any(invalid) && !status.any(held);
+    let nan = f32::NAN.to_bits();
+    if is_hidden(Status::PLANAR_INVALID, Status::PLANAR_HELD) {
+        [*x, *y, *rz] = [nan; 3];
+    }
+    if is_hidden(Status::VERTICAL_INVALID, Status::VERTICAL_HELD) {
+        [*z, *rx, *ry] = [nan; 3];
+    }
+}
+
 /// Words as an array of records, without a copy, corrected by the motion commanded at each row of an argument.
 fn records<'py>(
     py: Python<'py>,
     mut words: Vec<u32>,
     (argument, commanded): (&str, Option<Commanded<'_>>),
+    is_nan: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     if let Some(commanded) = commanded {
         commanded.correct(&mut words, argument)?;
+    }
+    if is_nan {
+        words.as_chunks_mut().0.iter_mut().for_each(hide_invalid);
     }
     let dtype = py
         .import("numpy")?

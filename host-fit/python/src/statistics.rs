@@ -7,7 +7,7 @@ use host_fit::report::parameters::{Parameter, parameters_in, temperature_paramet
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::terms;
 use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -53,22 +53,29 @@ impl Statistics<'_> {
         errors.collect()
     }
 
-    /// What `of` makes of the covariance and two of its rows, as a `hallstage.Labelled`.
-    pub fn labelled<'py>(
+    /// The names of the rows and columns of the covariance.
+    pub fn names(&self) -> PyResult<Vec<String>> {
+        Ok(self.covariance_or_raise()?.0)
+    }
+
+    fn covariance_or_raise(&self) -> PyResult<(Vec<String>, DMatrix<f64>)> {
+        let problem = "covariance: none stands beside the blob, as params.bin.posterior";
+        self.covariance()
+            .ok_or_else(|| PyValueError::new_err(problem))
+    }
+
+    /// A function of the covariance and two of its rows, as a matrix.
+    pub fn matrix<'py>(
         &self,
         py: Python<'py>,
         of: impl Fn(&DMatrix<f64>, usize, usize) -> f64,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let problem = "covariance: none stands beside the blob, as params.bin.posterior";
-        let covariance = self.covariance();
-        let (names, matrix) = covariance.ok_or_else(|| PyValueError::new_err(problem))?;
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (names, matrix) = self.covariance_or_raise()?;
         let n = names.len();
         // Its lower triangle counts, as in the file.
         let number = |(i, j): (usize, usize)| of(&matrix, i.max(j), i.min(j));
         let numbers = (0..n * n).map(|k| number((k / n, k % n)));
-        let array = PyArray1::from_iter(py, numbers).reshape([n, n])?;
-        let class = py.import("hallstage._results")?.getattr("Labelled")?;
-        class.call1((array, names))
+        PyArray1::from_iter(py, numbers).reshape([n, n])
     }
 
     /// The parameters as a dict of `hallstage.Parameter`, in the order of the covariance; parameters without one follow.

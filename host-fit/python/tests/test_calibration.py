@@ -57,17 +57,21 @@ def test_parameters_have_what_is_known_of_them(cal: hs.Calibration) -> None:
     assert cal.parameters["lever_arm_b"].unit == "m" and len(cal.parameters) == 81
 
 
-def test_covariance_and_correlations_are_labelled(cal: hs.Calibration, run30: hs.Log) -> None:
+def test_covariance_and_correlations_are_arrays_and_frames_have_names(cal: hs.Calibration, run30: hs.Log) -> None:
     of_31 = hs.fit(run30, model="31")
     for one in [cal, of_31]:
         covariance, correlations = one.covariance, one.correlations
-        assert covariance.labels == correlations.labels == list(one.parameters)[: len(covariance)]
-        std = [one.parameters[name].std for name in covariance.labels]
+        assert one.names == list(one.parameters)[: len(covariance)]
+        assert type(covariance) is type(correlations) is np.ndarray
+        std = [one.parameters[name].std for name in one.names]
         assert np.allclose(np.sqrt(np.diag(covariance)), np.array(std, dtype=float))
         assert np.allclose(covariance, covariance.T) and np.allclose(np.diag(correlations), 1)
         assert np.all(np.abs(correlations) < 1 + 1e-9)
-        part = covariance[:2]
-        assert isinstance(part, hs.Labelled) and part.labels == [] and part.dtype == np.float64
+        frame = one.covariance_frame()
+        assert list(frame.index) == list(frame.columns) == one.names and np.array_equal(frame, covariance)
+        table = one.to_frame()
+        assert list(table.index) == list(one.parameters) and list(table.columns) == ["value", "std", "unit"]
+        assert np.allclose(table.loc[one.names, "std"].astype(float), np.array(std, dtype=float))
 
 
 def test_residuals_are_the_errors_of_the_report(cal: hs.Calibration, run30: hs.Log) -> None:

@@ -30,10 +30,10 @@ def test_it_is_the_decoder_of_the_program_bit_for_bit(
     dec = hs.Decoder.open(tmp_path / "p.bin")
     assert dec.model == model
     assert paper.caps is not None
-    of_arrays = dec(hall=paper.hall, caps=paper.caps)
+    of_arrays = dec(hall=paper.hall, caps=paper.caps, invalid="zero")
     assert of_arrays.shape == (57_000,) and of_arrays.dtype.names == tuple(WORDS)
     assert np.array_equal(bits(of_arrays), bits(wanted))
-    assert np.array_equal(bits(dec(paper)), bits(wanted))
+    assert np.array_equal(bits(dec(paper, invalid="zero")), bits(wanted))
 
 
 def test_codes_of_any_layout_give_the_same_words(cal: hs.Calibration, service: hs.Log) -> None:
@@ -49,15 +49,23 @@ def test_codes_of_any_layout_give_the_same_words(cal: hs.Calibration, service: h
     assert np.array_equal(bits(dec(hall=hall[::3], caps=caps[::3])), wanted[::3])
 
 
-def test_what_is_invalid_is_zero_or_held_and_says_so(cal: hs.Calibration, service: hs.Log) -> None:
+def test_what_is_invalid_is_nan_zero_or_held_and_says_so(cal: hs.Calibration, service: hs.Log) -> None:
     dec, hall = cal.decoder(), service.hall.copy()
     hall[5:8, 0] = 32767
-    zero = dec(hall=hall, caps=service.caps)
+    zero = dec(hall=hall, caps=service.caps, invalid="zero")
+    nan = dec(hall=hall, caps=service.caps)
+    assert np.all(np.isnan(nan["x_m"][5:8])) and not np.any(np.isnan(nan["z_m"]))
+    assert np.array_equal(bits(nan)[8:], bits(zero)[8:]) and np.array_equal(nan["status"], zero["status"])
+    missing = hall.astype(float)
+    missing[5:8, 0] = np.nan
+    assert np.array_equal(bits(dec(hall=missing, caps=service.caps)), bits(nan))
+    u = cal.decoder().uncertainty(hall=hall, caps=service.caps)
+    assert np.all(np.isnan(u[5:8])) and np.all(np.isfinite(u[8:]))
     assert np.all(zero["x_m"][5:8] == 0) and np.all(zero["status"][5:8] & 1) and zero["z_m"][5] != 0
     names = [name for bit, name in hs.STATUS.items() if zero["status"][5] & bit]
     assert "Hall code A bad" in names and "planar pose invalid" in names
     held = dec(hall=hall, caps=service.caps, hold=2)
-    assert np.all(held["x_m"][5:7] == held["x_m"][4]) and held["x_m"][7] == 0
+    assert np.all(held["x_m"][5:7] == held["x_m"][4]) and np.isnan(held["x_m"][7])
     assert np.array_equal(bits(held)[8:], bits(zero)[8:])
 
 
@@ -79,12 +87,13 @@ def test_uncertainties_are_those_of_the_program_and_cover_the_errors(
     wanted = np.load(tmp_path / "pose.npy")
     dec = hs.Decoder.open(tmp_path / "p.bin")
     assert service.caps is not None
-    u = dec.uncertainty(service.hall, service.caps)
+    u = dec.uncertainty(hall=service.hall, caps=service.caps)
+    assert np.allclose(dec.uncertainty(service), u, rtol=1e-12)
     assert u.shape == (len(service), 3) and u.dtype == np.float64
     for axis, name in enumerate(["u_x_m", "u_y_m", "u_rz_rad"]):
         # The program knows the drawing, the blob alone does not.
         assert np.allclose(u[:, axis], wanted[name], rtol=1e-4)
-    whole = dec.uncertainty(service.hall, service.caps, whole=True)
+    whole = dec.uncertainty(service, whole=True)
     for axis, name in enumerate(["uc_x_m", "uc_y_m", "uc_rz_rad"]):
         assert np.allclose(whole[:, axis], wanted[name], rtol=1e-4)
     assert np.all(whole > u)
@@ -98,10 +107,10 @@ def test_a_blob_without_posterior_has_no_uncertainty(
     run30: hs.Log, cal: hs.Calibration, tmp_path: Path
 ) -> None:
     with pytest.raises(ValueError, match="31"):
-        hs.fit(run30, model="31").decoder().uncertainty(run30.hall, run30.caps)  # type: ignore[arg-type]
+        hs.fit(run30, model="31").decoder().uncertainty(run30)
     (tmp_path / "p.bin").write_bytes(cal.blob)
     with pytest.raises(ValueError, match="posterior"):
-        hs.Decoder.open(tmp_path / "p.bin").uncertainty(run30.hall, run30.caps)  # type: ignore[arg-type]
+        hs.Decoder.open(tmp_path / "p.bin").uncertainty(run30)
 
 
 def test_temperatures_are_read_where_parameters_want_them(cal: hs.Calibration, run30: hs.Log) -> None:
@@ -120,7 +129,7 @@ def test_a_wrong_argument_is_named(cal: hs.Calibration, run30: hs.Log, tmp_path:
     dec, hall, caps = cal.decoder(), run30.hall, run30.caps
     cases: list[tuple[dict[str, Any], str]] = [
         ({}, "hall"), ({"hall": hall}, "caps"), ({"caps": caps}, "hall"),
-        ({"hall": hall * 1.0, "caps": caps}, "hall: dtype"), ({"hall": hall[:5], "caps": caps}, "caps"),
+        ({"hall": hall + 0.5, "caps": caps}, "hall: numbers with a fraction"), ({"hall": hall, "caps": caps, "invalid": "x"}, "invalid"), ({"hall": hall[:5], "caps": caps}, "caps"),
         ({"log": run30, "hall": hall}, "log"), ({"hall": hall[:0], "caps": caps}, "hall: no rows"),
         ({"hall": hall[:, :2], "caps": caps}, "hall: shape"),
     ]  # fmt: skip

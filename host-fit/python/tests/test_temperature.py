@@ -46,7 +46,7 @@ def test_a_calibration_with_temperatures_is_that_of_the_program(toml: Path, host
     opened = hs.Calibration.open(folder / "own.bin", stage)
     for one in [cal, opened]:
         covariance = one.covariance
-        assert covariance.labels[-6:] == NAMES and covariance.shape == (87, 87)
+        assert one.names[-6:] == NAMES and covariance.shape == (87, 87)
         std = [one.parameters[name].std for name in NAMES]
         assert np.allclose(np.sqrt(np.diag(covariance))[-6:], np.array(std, dtype=float))
         assert one.parameters["k_a"].unit == "1/K"

@@ -3,6 +3,8 @@
 The work is done by the Rust library `host-fit`; this package has no model of its own. All numbers are SI: m, rad, s.
 """
 
+from importlib.metadata import version
+
 from ._errors import LogError, LogRefused
 from ._hallstage import (
     Calibration,
@@ -21,19 +23,21 @@ from ._hallstage import (
     status_names,
     write_demo,
 )
-from ._results import Finding, Findings, Labelled, OptimizeResult, Parameter, Residuals
+from ._results import Finding, Findings, OptimizeResult, Parameter, Residuals
+
+__version__: str = version("hallstage")
 
 #: What each bit of a decoder's `status` means, by its value.
 STATUS: dict[int, str] = status_names()
 
 __all__ = [
     "STATUS",
+    "__version__",
     "Calibration",
     "Decoder",
     "Evaluation",
     "Finding",
     "Findings",
-    "Labelled",
     "Log",
     "LogError",
     "LogRefused",

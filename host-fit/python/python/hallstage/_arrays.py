@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+#: Stands for a code that is missing.
+MISSING = -(2**31)
+
+
 def checked(argument: str, given: Any, columns: int | None, kinds: str, wanted: str, dtype: str) -> NDArray[Any]:
     """The argument in C order with this dtype, the same array where it has that form already.
 
-    It has at least one row, of one number or of `columns`. `kinds` are the accepted kinds of its own dtype.
+    It has at least one row, of one number or of `columns`. `kinds` are the accepted kinds of its own dtype; whole
+    floats are whole numbers, and NaN is a missing code where the dtype is int32.
     """
     if isinstance(given, np.ma.MaskedArray):
         raise ValueError(f"{argument}: a masked array; remove the masked rows, since the mask would be lost")
@@ -24,6 +29,14 @@ def checked(argument: str, given: Any, columns: int | None, kinds: str, wanted: 
         raise ValueError(f"{argument}: shape {array.shape}: {form}, is needed")
     if array.size == 0:
         raise ValueError(f"{argument}: no rows")
+    if dtype.startswith("int") and array.dtype.kind == "f":
+        missing = np.isnan(array)
+        if missing.any() and dtype != "int32":
+            raise ValueError(f"{argument}: row {int(np.argmax(missing))} is NaN: {wanted} are needed")
+        numbers = array[~missing]
+        if not np.all((np.abs(numbers) < 2.0**63) & (np.floor(numbers) == numbers)):
+            raise ValueError(f"{argument}: numbers with a fraction or beyond 64 bits: {wanted} are needed")
+        array = np.where(missing, MISSING, array.astype(np.float64)).astype(np.int64)
     if array.dtype.kind not in kinds:
         raise ValueError(f"{argument}: dtype {array.dtype}: {wanted} are needed")
     if dtype.startswith("int"):
@@ -74,6 +87,6 @@ def log_text(
         for column in array.reshape(len(array), -1).T.tolist():
             # A row may have no temperature.
             empty = "" if argument in ("mount", "body") else "nan"
-            columns.append([empty if number != number else repr(number) for number in column])
+            columns.append([empty if number != number or number == MISSING else repr(number) for number in column])
     header = ",".join(name for name, _ in names)
     return "\n".join([header, *map(",".join, zip(*columns, strict=True)), ""]), names

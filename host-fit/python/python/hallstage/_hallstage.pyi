@@ -7,7 +7,7 @@ import pandas  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from ._results import Finding, Findings, Labelled, OptimizeResult, Parameter, Residuals
+from ._results import Finding, Findings, OptimizeResult, Parameter, Residuals
 
 _Path = str | os.PathLike[str]
 _Model = Literal["auto", "12", "15", "30", "31", "field"]
@@ -195,9 +195,13 @@ class Calibration:
     @property
     def parameters(self) -> dict[str, Parameter]: ...
     @property
-    def covariance(self) -> Labelled: ...
+    def names(self) -> list[str]: ...
     @property
-    def correlations(self) -> Labelled: ...
+    def covariance(self) -> NDArray[np.float64]: ...
+    def covariance_frame(self) -> pandas.DataFrame: ...
+    def to_frame(self) -> pandas.DataFrame: ...
+    @property
+    def correlations(self) -> NDArray[np.float64]: ...
     @property
     def budget(self) -> pandas.DataFrame | None: ...
     @property
@@ -244,12 +248,14 @@ class Decoder:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         hold: int = 0,
+        invalid: Literal["nan", "zero"] = "nan",
     ) -> NDArray[np.void]: ...
     def uncertainty(
         self,
-        hall: ArrayLike,
-        caps: ArrayLike,
+        log: Log | None = None,
         *,
+        hall: ArrayLike | None = None,
+        caps: ArrayLike | None = None,
         mount: ArrayLike | None = None,
         body: ArrayLike | None = None,
         whole: bool = False,

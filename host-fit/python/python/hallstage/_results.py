@@ -109,24 +109,6 @@ class Parameter(NamedTuple):
         return (self.value - half, self.value + half)
 
 
-class Labelled(np.ndarray[tuple[int, int], np.dtype[np.float64]]):
-    """A square matrix, float64, (k, k), with the names of its rows and columns: `labels`.
-
-    A part or a product of it has no labels: `labels` is empty there.
-    """
-
-    labels: list[str]
-
-    def __new__(cls, matrix: NDArray[np.float64], labels: list[str]) -> Labelled:
-        made = np.asarray(matrix).view(cls)
-        made.labels = labels
-        return made
-
-    def __array_finalize__(self, of: Any) -> None:
-        labels = getattr(of, "labels", [])
-        self.labels = labels if self.shape == (len(labels), len(labels)) else []
-
-
 class Residuals:
     """Errors of the rows of a log: decoded pose less reference, zero deviations taken off.
 
@@ -177,20 +159,32 @@ class Residuals:
         power = np.mean(np.abs(bins) ** 2, axis=0) * 2 * period / (0.375 * length)
         return (np.arange(1, length // 2) / (length * period), np.sqrt(power))
 
-    def plot(self) -> Figure:
-        """Errors over time, a panel for each axis, um and urad; needs matplotlib."""
+    def plot(self, ax: Any = None) -> Figure:
+        """Errors over time, s, um and urad: a panel for each axis, or all in `ax`; needs matplotlib.
+
+        Movements follow each other, and their borders are grey.
+        """
         from matplotlib import pyplot
 
-        figure, panels = pyplot.subplots(3, 1, sharex=True)
-        rows = np.arange(len(self))
-        begins = np.flatnonzero(np.diff(self.movement)) + 1
+        if ax is None:
+            figure, panels = pyplot.subplots(3, 1, sharex=True)
+        else:
+            figure, panels = ax.figure, [ax] * 3
+        steps = np.diff(self.time)
+        borders = np.flatnonzero(np.diff(self.movement)) + 1
+        period = float(np.median(steps)) if len(steps) else 0.0
+        # A movement may start its time anew.
+        steps = np.where((np.diff(self.movement) != 0) & (steps <= 0), period, steps)
+        seconds = np.concatenate([self.time[:1], self.time[:1] + np.cumsum(steps)])
         for panel, (axis, (name, unit)) in zip(panels, _AXES.items(), strict=True):
-            panel.plot(rows, getattr(self, axis) * 1e6, linewidth=0.5)
-            if len(begins) < 150:
-                for row in begins:
-                    panel.axvline(row, color="0.8", linewidth=0.5, zorder=0)
-            panel.set_ylabel(f"{name}, {unit}".replace("u", "\N{MICRO SIGN}"))
-        panels[-1].set_xlabel("row")
+            unit = unit.replace("u", "\N{MICRO SIGN}", 1)
+            panel.plot(seconds, getattr(self, axis) * 1e6, linewidth=0.5, label=f"{name}, {unit}")
+            panel.set_ylabel(f"{name}, {unit}" if ax is None else "error")
+            for row in borders if len(borders) < 150 else ():
+                panel.axvline(seconds[row], color="0.8", linewidth=0.5, zorder=0)
+        if ax is not None:
+            ax.legend()
+        panels[-1].set_xlabel("time, s")
         return figure
 
 
