@@ -50,7 +50,7 @@ def test_fast_moves_have_the_errors_that_an_evaluation_expects(
     dec = in_motion.decoder()
     movements = np.split(np.arange(len(fast)), np.flatnonzero(np.diff(fast.movement)) + 1)
 
-    def rms(poses: np.ndarray) -> np.ndarray:
+    def rms(poses: np.ndarray) -> Any:
         # Each movement has its own zero deviation.
         errors = planar(poses) - fast.reference
         return np.sqrt(np.mean([np.var(errors[rows], axis=0) for rows in movements], axis=0))

@@ -34,7 +34,7 @@ def checked(argument: str, given: Any, columns: int | None, kinds: str, wanted: 
         if missing.any() and dtype != "int32":
             raise ValueError(f"{argument}: row {int(np.argmax(missing))} is NaN: {wanted} are needed")
         numbers = array[~missing]
-        if not np.all((np.abs(numbers) < 2.0**63) & (np.floor(numbers) == numbers)):
+        if not np.all((np.abs(numbers.astype(np.float64)) < 2.0**63) & (np.floor(numbers) == numbers)):
             raise ValueError(f"{argument}: numbers with a fraction or beyond 64 bits: {wanted} are needed")
         array = np.where(missing, MISSING, array.astype(np.float64)).astype(np.int64)
     if array.dtype.kind not in kinds:
