@@ -6,7 +6,7 @@ use crate::output::{Output, OutputError};
 use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
-use runtime::{AnyDecoder, MotionCorrection, OnInvalid, PlanarPose, PoseTracker};
+use runtime::{AnyDecoder, CommandedMotion, MotionCorrection, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 
 /// Bytes that are written at once.
@@ -83,40 +83,40 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
         ..ReadOptions::DECODE
     };
     let mut log = LogRows::open(log, "decoding", stage, &options)?;
-    let commanded = settings.correction.filter(|_| log.has_reference());
-    let mut commanded = commanded.map(Commanded::new);
+    let correction = settings.correction.filter(|_| log.has_reference());
+    let mut commanded = Commanded::default();
     let mut bytes = settings.header(0);
     let rows = loop {
-        let row = match log.next_row() {
-            Ok(Some(row)) => row,
-            over => break over,
+        let (ready, over) = match log.next_row() {
+            Ok(Some(row)) if correction.is_some() => (commanded.take(row), None),
+            Ok(Some(row)) => (vec![(row, CommandedMotion::default())], None),
+            over => (commanded.known(true), Some(over)),
         };
-        if row.begins {
-            tracker.forget();
+        for (row, motion) in ready {
+            if row.begins {
+                tracker.forget();
+            }
+            let frame = &row.row.frame;
+            let mut reading = frame.decode(decoder, &PlanarPose::ZERO);
+            if let (Some(correction), Some(pose)) = (correction, reading.planar()) {
+                reading.pose.planar = correction.correct(pose, &motion).unwrap_or(pose);
+            }
+            let pose = PoseRow {
+                movement: row.movement,
+                t_us: row.row.t_us,
+                reading: tracker.tick_with(frame.sequence(), |_| reading),
+            };
+            counts.add(pose.reading.status);
+            settings.write(&pose, &mut bytes);
         }
-        let frame = &row.row.frame;
-        let reading = frame.decode(decoder, &PlanarPose::ZERO);
-        let pose = PoseRow {
-            movement: row.movement,
-            t_us: row.row.t_us,
-            reading: tracker.tick_with(frame.sequence(), |_| reading),
-        };
-        counts.add(pose.reading.status);
-        let poses = match &mut commanded {
-            Some(commanded) => commanded.take(&row, pose),
-            None => vec![pose],
-        };
-        poses
-            .iter()
-            .for_each(|pose| settings.write(pose, &mut bytes));
         if bytes.len() >= PIECE_BYTES {
             out.write(&bytes)?;
             bytes.clear();
         }
+        if let Some(over) = over {
+            break over;
+        }
     };
-    for pose in commanded.iter_mut().flat_map(|of| of.corrected(true)) {
-        settings.write(&pose, &mut bytes);
-    }
     out.write(&bytes)?;
     rows?;
     if settings.format == PoseFormat::Npy {
