@@ -1,7 +1,7 @@
 //! A planned run: its figures, and its tables.
 
 use super::errors::per_axis;
-use super::figure::{Figure, Group, bare, figure, group, micro};
+use super::figure::{Figure, Group, Item, bare, figure, group, micro};
 use super::parameters::probe_table;
 use super::table::Table;
 use hallstage_calibration::plan::Plan;
@@ -82,17 +82,21 @@ pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Group {
         "rows" => run.rows(stage.servo_period_s),
         "axes" => json!((0..6).map(axis).collect::<Vec<_>>()),
         "service" => per_axis(predicted),
-        "acceleration" => per_axis(|k| per_acceleration(plan, k, stage)),
+        "acceleration" => Group((0..6).map(|k| per_acceleration(plan, k, stage)).collect()),
         "parameters" => Value::from((0..COUNT).map(parameter).collect::<Map<_, _>>()),
         "least_determined" => worst,
         "temperature" => protocol.iter().map(warm_log).collect::<Vec<_>>(),
     }
 }
 
-/// Standard error of the change of a probe's signal by the acceleration of X, Y or Rz.
-fn per_acceleration(plan: &Plan, k: usize, stage: &Stage) -> Group {
+/// Standard error of the change of a probe's signal by the acceleration of an axis, by its key.
+fn per_acceleration(plan: &Plan, k: usize, stage: &Stage) -> (String, Item) {
     let error = acceleration_error(&plan.run, k, stage.servo_period_s);
-    group! { "standard_error" => bare(rounded(error * 1e6, 2), "um/(m/s2)") }
+    let error = bare(rounded(error * 1e6, 2), "um/(m/s2)");
+    (
+        AXES[k].key.to_owned(),
+        group! { "standard_error" => error }.into(),
+    )
 }
 
 /// What the run cannot tell, if there is something: errors that follow an acceleration.
@@ -101,7 +105,7 @@ pub fn untold(plan: &Plan, stage: &Stage) -> String {
         let error = acceleration_error(&plan.run, *k, stage.servo_period_s);
         error > ACCELERATION_ERROR_MAX
     };
-    let axes: Vec<&str> = (0..3).filter(is_unknown).map(|k| AXES[k].key).collect();
+    let axes: Vec<&str> = (0..6).filter(is_unknown).map(|k| AXES[k].key).collect();
     if axes.is_empty() {
         return String::new();
     }

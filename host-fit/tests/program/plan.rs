@@ -6,18 +6,18 @@ use host_fit::input::shipped::STAGE_TOML;
 #[test]
 fn a_stage_that_cannot_follow_the_fast_tone_is_told_what_its_run_lacks() {
     let bench = Bench::new();
-    let says = "cannot tell errors that follow the acceleration of x:";
+    let says = "cannot tell errors that follow the acceleration of z:";
     let planned = |stage: &str| {
         let command = format!("plan --stage {stage} --seconds 8 --json plan.json");
         let shown = stdout(&bench.good(&command));
-        let error = bench.json("plan.json")["acceleration"]["x"]["standard_error"].clone();
+        let error = bench.json("plan.json")["acceleration"]["z"]["standard_error"].clone();
         (shown.contains(says), number(&error))
     };
-    let limited = "\nx = { acceleration_m_per_s2 = 0.01, service_m = 500e-6";
+    let limited = "\nz = { acceleration_m_per_s2 = 0.01, service_m = 240e-6";
     bench.write("usual.toml", STAGE_TOML);
     bench.write(
         "stiff.toml",
-        STAGE_TOML.replace("\nx = { service_m = 500e-6", limited),
+        STAGE_TOML.replace("\nz = { service_m = 240e-6", limited),
     );
     let (is_told, error) = planned("usual.toml");
     assert!(!is_told && error < 0.1, "{error}");
