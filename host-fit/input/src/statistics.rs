@@ -1,4 +1,8 @@
-//! Medians and quantiles.
+//! Medians and quantiles, and what is no noise.
+
+/// A value beyond this many standard deviations is no noise: noise is there once in 10^10 rows, but residuals have
+/// longer tails.
+pub const CLEAR: f64 = 6.5;
 
 /// The number below which this share of the numbers lies; `None` without numbers. Rearranges them.
 pub fn quantile(numbers: &mut [f64], share: f64) -> Option<f64> {

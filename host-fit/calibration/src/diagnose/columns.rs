@@ -2,7 +2,7 @@
 
 use super::limits::{CLEAR, severity_of_share};
 use super::slopes::Slopes;
-use crate::judge::predicted::{declared_service, service_range};
+use crate::judge::predicted::{cost, declared_service, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
 use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, probe_noise_m};
@@ -56,10 +56,7 @@ impl ColumnFaults {
             true => probes_m[i] * probes_m[i],
             false => 0.0,
         });
-        let cost = |own: [f64; 3]| {
-            let ratio = |axis: usize| (1.0 + own[axis].max(0.0) / floor[axis]).sqrt();
-            [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max)
-        };
+        let cost = |own: [f64; 3]| cost(own, floor);
         let mut out = Self {
             findings: Vec::new(),
             bent: [0.0; 3],

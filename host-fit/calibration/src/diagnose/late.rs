@@ -66,10 +66,7 @@ fn told(lag: ReferenceLag, stage: &Stage, at_rest: Option<&Predicted>) -> Option
     let value_s = lag.value_s - stage.latency_s.unwrap_or(0.0);
     let lag = &ReferenceLag { value_s, ..lag };
     let added = by_late_probes(value_s, stage);
-    let cost = at_rest.map(|at_rest| {
-        let ratio = |axis: usize| 1.0 + added[axis] / at_rest.noise(axis).powi(2);
-        [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max).sqrt()
-    });
+    let cost = at_rest.map(|at_rest| at_rest.cost_of(added));
     let is_felt = cost.is_some_and(|cost| severity(cost) > Severity::Note);
     let kind = Kind::LateReference {
         lag_us: value_s * 1e6,

@@ -1,6 +1,7 @@
 //! The limits that the tests of the diagnosis share.
 
 use hallstage_input::finding::Severity;
+pub(super) use hallstage_input::statistics::CLEAR;
 
 /// Prior odds: one log in 100 has a fault large enough to matter.
 pub(super) const RARITY: f64 = 100.0;
@@ -10,9 +11,6 @@ pub(super) const UNDECIDED: f64 = 6.0;
 pub(super) const ROUNDS: usize = 8;
 /// A long log is scanned in about this many means: a scan is quick, and onsets are known within 0.1 s.
 pub(super) const MEANS_MAX: usize = 4000;
-/// A value beyond this many standard deviations is no noise: noise is there once in 10^10 rows, but residuals have
-/// longer tails.
-pub(super) const CLEAR: f64 = 6.5;
 /// An axis that moves by a smaller or a larger part of its declared range may have a wrong scale: no log shows a
 /// scale that all channels of a kind share.
 pub(super) const SPANS: (f64, f64) = (0.1, 2.0);

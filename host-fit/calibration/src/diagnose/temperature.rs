@@ -4,7 +4,7 @@
 use super::limits::{RARITY, UNDECIDED};
 use super::units;
 use crate::fit::Fit;
-use crate::judge::predicted::declared_service;
+use crate::judge::predicted::{cost, declared_service};
 use crate::judge::statistics::white_noise;
 use crate::judge::verdict::severity;
 use hallstage_input::dataset::Dataset;
@@ -41,7 +41,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
         }
     };
     let floor = white_noise(&fit.decoded.errors, &dataset.movements);
-    let cost = |sensor: usize| {
+    let cost_of = |sensor: usize| {
         let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
         for (probe, errors) in error_per_k.iter().enumerate() {
             let k = Coefficient::new(probe, sensor).row();
@@ -50,9 +50,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
         let changes_k = [drift_k(dataset, temperature, sensor); 2];
         let changes = covariance_at(&covariance, &parameters, changes_k);
         let service = declared_service(stage, &parameters, [0.0; 3])?.variance(&changes);
-        let ratio =
-            |axis: usize| (1.0 + service.systematic[axis] / (floor[axis] * floor[axis])).sqrt();
-        let ratio = (0..3).map(ratio).fold(1.0, f64::max);
+        let ratio = cost(service.systematic, floor.map(|rms| rms * rms));
         Some(ratio).filter(|ratio| ratio.is_finite())
     };
     let there = (0..2).filter(|sensor| temperature.reach_mk[*sensor] != 0);
@@ -77,7 +75,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
             is_field: fit.field.is_some(),
             deviations: is_other.then_some(deviations),
         });
-        let found = match cost(sensor) {
+        let found = match cost_of(sensor) {
             Some(cost) => found.with_severity(severity(cost)).with_cost(cost),
             None => found,
         };

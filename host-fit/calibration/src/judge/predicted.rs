@@ -33,6 +33,12 @@ pub fn service_range(stage: &Stage) -> ([f64; 3], [f64; 3]) {
     ([0, 1, 2].map(most), [3, 4, 5].map(most))
 }
 
+/// The worst axis over the noise floor where these variances are added to the variances of the floor: m2, m2, rad2.
+pub fn cost(added: [f64; 3], floor: [f64; 3]) -> f64 {
+    let ratio = |axis: usize| (1.0 + added[axis].max(0.0) / floor[axis]).sqrt();
+    [0, 1, 2].map(ratio).into_iter().fold(1.0, f64::max)
+}
+
 /// Errors of X, Y, Rz that are predicted for service over the range that `[motion]` declares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predicted {
@@ -69,6 +75,11 @@ impl Predicted {
     /// The noise floor of an axis, m or rad.
     pub fn noise(&self, axis: usize) -> f64 {
         self.rms[axis] / self.ratio[axis]
+    }
+
+    /// The cost of these variances alone.
+    pub fn cost_of(&self, added: [f64; 3]) -> f64 {
+        cost(added, [0, 1, 2].map(|axis| self.noise(axis).powi(2)))
     }
 
     /// With other errors that add these variances (m2, m2, rad2), or cancel known ones.

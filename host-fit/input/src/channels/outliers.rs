@@ -2,9 +2,8 @@
 
 use super::signal::Signal;
 use super::{codes, noise};
+use crate::statistics::CLEAR;
 
-/// A row is an outlier from this many standard deviations of the fourth differences on: noise is there once in 10^10 rows.
-const CLEAR: f64 = 6.5;
 /// Variance of the fourth differences of white noise of variance one.
 const POWER: f64 = 70.0;
 /// The weight of the middle row in fourth differences.

@@ -2,7 +2,7 @@
 
 use super::Line;
 use super::signal::Signal;
-use crate::statistics::median;
+use crate::statistics::{CLEAR, median};
 use nalgebra::Matrix3;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
@@ -25,8 +25,6 @@ const TAPER_POWER: f64 = 0.258;
 const LOBE: usize = 4;
 /// Bins on either side that give the level of the noise.
 const SIDE: usize = 20;
-/// A line is this many standard deviations above the noise.
-const CLEAR: f64 = 6.5;
 /// Motion of the stage shows in the other kind of channels with more than this part of the power: an arm makes one of eight of
 /// the amplitude.
 const MOVES: f64 = 1.0 / 64.0;

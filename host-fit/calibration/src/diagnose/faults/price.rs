@@ -270,15 +270,10 @@ fn unexplained_finding(
     fault: Option<&Fault>,
     predicted: &Predicted,
 ) -> Option<Finding> {
-    let cost = |added: f64| {
-        let of =
-            |axis: usize| (variances[axis] + added * drifts[axis]) / predicted.noise(axis).powi(2);
-        (1.0 + of(0).max(of(1)).max(of(2))).sqrt()
-    };
-    let ratio = cost(1.0);
+    let ratio = predicted.cost_of([0, 1, 2].map(|axis| variances[axis] + drifts[axis]));
     let severity = match predicted.worst_ratio() <= GOOD_MAX {
         true => Severity::Note,
-        false => severity(cost(0.0)).max(Severity::Warn),
+        false => severity(predicted.cost_of(variances)).max(Severity::Warn),
     };
     let found = Finding::new(Kind::Inconsistent { ratio }).with_severity(severity);
     let found = Finding {
