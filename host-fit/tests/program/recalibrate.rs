@@ -167,7 +167,9 @@ fn eval_of_a_fast_log_says_how_fast_it_is_and_is_limited_by_its_errors() {
     bench.good(&format!("simulate --plan run.csv {late} --out log.csv"));
     bench.good("fit log.csv --out late.bin");
     for (lag, verdict, severity) in [(late, "limited", "warn"), ("--seed 3", "good", "note")] {
-        bench.good(&format!("simulate --protocol fast {lag} --out fast.csv"));
+        bench.good(&format!(
+            "simulate --protocol fast {lag} --out fast.csv --force"
+        ));
         let json = bench.figures("eval late.bin fast.csv");
         assert_eq!(json["verdict"], verdict, "{}", json["findings"]);
         let findings = json["findings"].as_array().expect("a list");
