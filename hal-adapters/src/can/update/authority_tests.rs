@@ -102,6 +102,18 @@ fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
 }
 
 #[test]
+fn a_nonce_expires_after_five_seconds() {
+    let off = Request::ServoOff { seconds: 1 };
+    for (late, answer) in [(0, DONE), (1, NOT_AUTHORISED)] {
+        let mut bench = Bench::new(Some(KEY));
+        let own = tag(&KEY, &bench.nonce(), &Command::new(off, 7), &[]);
+        bench.tag(7, own);
+        bench.ticks(IDLE_S * TICKS_PER_S + late);
+        assert_eq!(bench.ask(off, 7), answer);
+    }
+}
+
+#[test]
 fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
     let mut bench = Bench::new(Some(KEY));
     let off = Request::ServoOff { seconds: 1 };

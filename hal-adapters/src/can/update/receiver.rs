@@ -9,7 +9,7 @@ use crate::can::command::{Answer, Command, Outcome, Request};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
-/// A transfer without a frame for this time is closed, s.
+/// A transfer without a frame for this time is closed, and a nonce without its tag expires, s.
 const IDLE_S: u32 = 5;
 
 /// An open transfer.
@@ -39,8 +39,9 @@ pub struct Receiver<'s> {
     idle_ticks_max: u32,
     staging: Staging,
     transfer: Option<Transfer>,
-    /// The nonce of the next tag: asked for and not used yet.
+    /// The nonce of the next tag: asked for and not used yet, and its age.
     nonce: Option<Nonce>,
+    nonce_ticks: u32,
     /// The last command with a right tag, and its answer, until the next challenge.
     answered: Option<(Command, (Outcome, u32))>,
     /// Token and end of the last transfer, for a host that asks again.
@@ -57,6 +58,7 @@ impl<'s> Receiver<'s> {
             staging: Staging::EMPTY,
             transfer: None,
             nonce: None,
+            nonce_ticks: 0,
             answered: None,
             ended: None,
             wants_reset: false,
@@ -160,8 +162,12 @@ impl<'s> Receiver<'s> {
         }
     }
 
-    /// One tick: closes a transfer with a silent host, and any transfer once the servo is on.
+    /// One tick: closes a transfer with a silent host, and any transfer once the servo is on; forgets an old nonce.
     pub fn tick(&mut self, servo_is_off: bool) {
+        self.nonce_ticks = self.nonce_ticks.saturating_add(1);
+        self.nonce = self
+            .nonce
+            .filter(|_| self.nonce_ticks <= self.idle_ticks_max);
         let Some(transfer) = self.transfer.as_mut().filter(|t| t.commit.is_none()) else {
             return;
         };
@@ -217,7 +223,7 @@ impl<'s> Receiver<'s> {
 
     fn challenge(&mut self, part: u8, nonce: Option<Nonce>) -> (Outcome, u32) {
         if part == 0 {
-            (self.nonce, self.answered) = (nonce, None);
+            (self.nonce, self.nonce_ticks, self.answered) = (nonce, 0, None);
             self.staging.clear_tag();
         }
         let drawn = self.nonce.as_ref();
