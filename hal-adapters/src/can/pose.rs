@@ -34,29 +34,24 @@ const PLANAR: [Message; 3] = [Message::PoseX, Message::PoseY, Message::PoseRz];
 /// The vertical axes.
 const VERTICAL: [Message; 3] = [Message::PoseZ, Message::PoseRx, Message::PoseRy];
 
-/// The 20 bits of a status on the bus. [`Status::TEMPERATURE_MISSING`] of a valid pose takes the place
-/// of [`Status::PLANAR_HELD`], which only an invalid one has.
+/// Bit 15 on the bus is [`Status::TEMPERATURE_MISSING`]. [`Status::PLANAR_HELD`] is not sent: a held pose is invalid.
+const MISSING_ON_BUS: u32 = Status::PLANAR_HELD.bits();
+
+/// The 20 bits of a status on the bus.
 #[inline(always)]
 pub const fn status_to_bus(status: Status) -> u32 {
-    const FREE: u32 = Status::PLANAR_HELD.bits();
-    let bits = status.bits() & (u32::MAX >> (32 - SHORT_BITS));
-    if status.any(Status::PLANAR_INVALID) {
-        bits
-    } else if status.any(Status::TEMPERATURE_MISSING) {
-        bits | FREE
-    } else {
-        bits & !FREE
-    }
+    let others = status.bits() & (u32::MAX >> (32 - SHORT_BITS)) & !MISSING_ON_BUS;
+    let is_missing = status.any(Status::TEMPERATURE_MISSING) as u32;
+    others | is_missing << MISSING_ON_BUS.trailing_zeros()
 }
 
 /// The status of a pose frame, from its 20 bits.
 pub const fn status_from_bus(bits: u32) -> Status {
-    let status = Status::from_bits(bits);
-    if status.any(Status::PLANAR_HELD) && !status.any(Status::PLANAR_INVALID) {
-        let others = bits & !Status::PLANAR_HELD.bits();
-        return Status::from_bits(others).with(Status::TEMPERATURE_MISSING);
+    let others = Status::from_bits(bits & !MISSING_ON_BUS);
+    if bits & MISSING_ON_BUS == 0 {
+        return others;
     }
-    status
+    others.with(Status::TEMPERATURE_MISSING)
 }
 
 const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
