@@ -14,7 +14,6 @@ use firmware::store::Image;
 use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
 use runtime::RawFrame;
-use std::mem::MaybeUninit;
 use std::ptr::NonNull;
 
 /// Frames that a tick takes from the bus at most.
@@ -159,7 +158,7 @@ impl Node {
 
 /// The statics of the controller, for one start.
 struct Statics {
-    place: NonNull<MaybeUninit<Loaded>>,
+    place: NonNull<Option<Loaded>>,
 }
 
 impl Drop for Statics {
@@ -176,7 +175,7 @@ fn start(
     (serial, key): (Option<&'static str>, Option<Key>),
     before: &Before,
 ) -> (Ticking<'static>, Records<FlashModel>, Statics) {
-    let place = Box::leak(Box::new(MaybeUninit::uninit()));
+    let place = Box::leak(Box::new(None));
     let statics = Statics {
         place: NonNull::from(&mut *place),
     };

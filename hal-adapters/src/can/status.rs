@@ -110,8 +110,8 @@ impl NodeStatus {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardFacts {
     /// The last fault that caused a reset since power-on. Bits 0 to 7: 0 none, 1 panic, 2 hard
-    /// fault, 3 stack overflow, 4 clock failed, 5 watchdog. Bits 8 to 15: the step of the
-    /// start-up that was running, 0 when ticking.
+    /// fault, 3 stack overflow, 4 clock failed, 5 watchdog, 6 parameters in RAM changed. Bits 8 to
+    /// 15: the step of the start-up that was running, 0 when ticking.
     pub last_fault: u32,
     /// Program counter of that fault.
     pub fault_address: u32,

@@ -47,7 +47,8 @@ pub fn begin(step: Step) {
     update(|record| record.step = step);
 }
 
-fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
+/// Notes a fault and resets.
+pub fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
     update(|record| record.note(kind, address, detail));
     SCB::sys_reset()
 }

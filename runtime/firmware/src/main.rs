@@ -9,14 +9,15 @@
 //!   finished by a second alarm when the codes have settled; it does not wait in between.
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
-//! - A panic, a fault of the core, a stack overflow and a crystal that stops are noted in RAM that survives a
-//!   reset, and reset. The next start reports them. No tick can reach a panic: the linker keeps only panics of
+//! - A panic, a fault of the core, a stack overflow, a crystal that stops and parameters that change in RAM are noted
+//!   in RAM that survives a reset, and reset. The next start reports them. No tick can reach a panic: the linker keeps only panics of
 //!   the HAL's set-up of the clocks.
 #![no_std]
 #![no_main]
 
 mod board;
 mod bus;
+mod constants;
 mod fault;
 mod flash;
 mod random;
@@ -31,15 +32,16 @@ mod watchdog;
 mod app {
     use super::start;
     use super::timer::{SETTLED, TICK};
-    use super::{board, board::Converter, bus::Bus, fault, flash, timer::Clock};
+    use super::{
+        board, board::Converter, bus::Bus, constants::Constants, fault, flash, timer::Clock,
+    };
     use super::{random::Random, supply::Supply, wait::Stopwatch, watchdog::Watchdog};
-    use core::mem::MaybeUninit;
     use cortex_m::peripheral::SCB;
     use firmware::acquisition::Acquisition;
     use firmware::fpu;
     use firmware::node::{Facts, Node, Parameters, SampleFault};
     use firmware::records::{Loaded, Records};
-    use firmware::retained::{Retained, Step};
+    use firmware::retained::{FaultKind, Retained, Step};
     use firmware::schedule::{Schedule, TICKS_PER_S, Tick};
     use firmware::start_up::PROVEN_TICKS;
     use firmware::telemetry::STAGE;
@@ -69,11 +71,12 @@ mod app {
         /// The tick while its codes settle.
         open: Option<Tick>,
         acquisition: Acquisition<Converter>,
-        node: &'static mut Node<'static>,
+        node: Node<'static>,
         facts: Facts,
         /// The zero deviation in the retained record.
         zero: PlanarPose<f32>,
         records: Records<flash::Sectors>,
+        constants: Option<Constants>,
         random: Random,
         /// Ticks that a reset or an erase has waited for the answers to leave.
         silence_waits: u32,
@@ -84,11 +87,7 @@ mod app {
         overrun_ticks: u32,
     }
 
-    #[init(local = [
-        // Without a value, so that flash holds none.
-        loaded: MaybeUninit<Loaded> = MaybeUninit::uninit(),
-        node_place: MaybeUninit<Node<'static>> = MaybeUninit::uninit(),
-    ])]
+    #[init(local = [loaded: Option<Loaded> = None])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
@@ -131,8 +130,10 @@ mod app {
             key: board::STAGE_KEY,
             program_version: board::PROGRAM_VERSION,
         };
-        let node = node(cx.local.node_place, parameters, before.by_fault, identity);
-        let zero_lost = before.restore_zero(node, blob);
+        let layout = Layout::from_bits(Converter::CODE_BITS);
+        let node = Node::new(parameters, before.by_fault, layout, identity);
+        let mut node = node.with_rezero_limits(board::rezero_limits());
+        let zero_lost = before.restore_zero(&mut node, blob);
         let zero = node.zero();
         // Without a running blob the record stays for a later start.
         if node.decodes() {
@@ -169,6 +170,7 @@ mod app {
                 },
                 zero,
                 records,
+                constants: loaded.map(Constants::new),
                 random,
                 silence_waits: 0,
                 watchdog,
@@ -178,20 +180,6 @@ mod app {
                 overrun_ticks: 0,
             },
         )
-    }
-
-    /// Puts the node into its static. In a function of its own, because its stack is not needed while the parameters are
-    /// read.
-    #[inline(never)]
-    fn node(
-        place: &'static mut MaybeUninit<Node<'static>>,
-        parameters: Parameters<'static>,
-        by_fault: bool,
-        identity: Identity<'static>,
-    ) -> &'static mut Node<'static> {
-        let layout = Layout::from_bits(Converter::CODE_BITS);
-        let node = Node::new(parameters, by_fault, layout, identity);
-        place.write(node.with_rezero_limits(board::rezero_limits()))
     }
 
     #[idle]
@@ -206,7 +194,7 @@ mod app {
         binds = TIM2,
         priority = 1,
         local = [
-            clock, schedule, open, acquisition, node, facts, zero, records, random,
+            clock, schedule, open, acquisition, node, facts, zero, records, constants, random,
             silence_waits, watchdog, stopwatch, led, servo, overrun_ticks
         ],
         shared = [bus]
@@ -261,6 +249,9 @@ mod app {
         // After the pose: its frames find the mailboxes empty.
         bus.receive(local.node, local.records, local.random);
         bus.send();
+        if !(local.constants.as_mut()).is_none_or(Constants::are_sound) {
+            fault::reset_by(FaultKind::Constants, 0, 0);
+        }
         local.led.set_state(PinState::from(local.node.light()));
         if *local.zero != local.node.zero() {
             *local.zero = local.node.zero();

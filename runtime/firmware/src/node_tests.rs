@@ -15,7 +15,7 @@ fn loaded() -> &'static Loaded {
     let mut flash = FlashModel::erased();
     flash.load(0, &blob(0));
     let (mut records, _) = Records::start(flash, Choice::Newest, None);
-    let place = Box::leak(Box::new(core::mem::MaybeUninit::uninit()));
+    let place = Box::leak(Box::new(None));
     records.load(Choice::Newest, place).expect("a sound slot")
 }
 

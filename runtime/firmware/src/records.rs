@@ -1,7 +1,6 @@
 //! The parameters in flash: the running blob, the reason why another is refused, and new blobs from the bus.
 
 use crate::store::{self, Contents, Flash, Image, SLOTS, Stored};
-use core::mem::MaybeUninit;
 use hal_adapters::can::update::{BlobId, NotWritten, Running, Store, word_at};
 use runtime::blob::{BlobError, MAX_BYTES};
 use runtime::parameters::Text;
@@ -65,9 +64,7 @@ impl<F: Flash> Records<F> {
         (records, refusal)
     }
 
-    /// The blob of a slot, if it is sound. In a function of its own, because a parameter set takes 700 bytes of
-    /// stack.
-    #[inline(never)]
+    /// The blob of a slot, if it is sound.
     fn look(
         &mut self,
         slot: u8,
@@ -98,11 +95,10 @@ impl<F: Flash> Records<F> {
     }
 
     /// Loads the chosen blob, which runs from now on. `None` if it is not there.
-    #[inline(never)]
     pub fn load(
         &mut self,
         choice: Choice,
-        place: &'static mut MaybeUninit<Loaded>,
+        place: &'static mut Option<Loaded>,
     ) -> Option<&'static Loaded> {
         let stored = match choice {
             Choice::Newest => self.latest(|_| true),
@@ -112,7 +108,7 @@ impl<F: Flash> Records<F> {
         let image = Image::read(&self.flash, stored.slot);
         let read = ParameterSet::from_flash(image.blob());
         let set = read.as_ref().ok()?;
-        let loaded: &'static Loaded = place.write(Loaded {
+        let loaded: &'static Loaded = place.insert(Loaded {
             decoder: set.decoder(),
             serial: set.serial.clone(),
             crc: stored.crc,

@@ -7,7 +7,7 @@ use std::boxed::Box;
 
 fn runs(flash: &mut FlashModel, choice: Choice) -> Option<u32> {
     let (mut records, _) = Records::start(flash, choice, SERIAL);
-    let place = Box::leak(Box::new(MaybeUninit::uninit()));
+    let place = Box::leak(Box::new(None));
     records.load(choice, place).map(|loaded| loaded.crc)
 }
 
@@ -22,7 +22,7 @@ fn what_runs_stays_however_much_is_stored_before_an_activation() {
         // As after a reset: the newest blob waits.
         let choice = Choice::Blob(ran);
         let (mut records, _) = Records::start(&mut flash, choice, SERIAL);
-        let place = Box::leak(Box::new(MaybeUninit::uninit()));
+        let place = Box::leak(Box::new(None));
         assert!(records.load(choice, place).is_some());
         assert_eq!(records.write(sequence, &blob(number)), Ok(()));
         assert!(records.word(0).is_some());

@@ -3,7 +3,7 @@
 //!
 //! After power-on the RAM holds noise and is not read. After any other reset it is used only if its check is right.
 
-use crc::{CRC_32_ISCSI, Crc, NoTable};
+use crate::store::CRC;
 use runtime::PlanarPose;
 
 /// Words of the record with its check.
@@ -18,7 +18,6 @@ const ACTIVATED_BIT: u32 = 10;
 const EARLY_SHIFT: u32 = 16;
 /// Early faults in a row that stop the program.
 const EARLY_MAX: u8 = 2;
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// The step of the program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,6 +63,8 @@ pub enum FaultKind {
     ClockFailed = 4,
     /// The watchdog was not fed. Address and detail: 0.
     Watchdog = 5,
+    /// The parameters in RAM changed. Address and detail: 0.
+    Constants = 6,
 }
 
 /// The last fault, as words.

@@ -49,12 +49,8 @@ const SEALED: [u8; 4] = *b"SEAL";
 const VOID: [u8; 4] = [0; 4];
 const BLANK: [u8; 4] = [0xff; 4];
 
-/// CRC-32C, without a table where flash is short.
-static CRC: Crc<u32, Lookup> = Crc::<u32, Lookup>::new(&CRC_32_ISCSI);
-#[cfg(target_os = "none")]
-type Lookup = crc::NoTable;
-#[cfg(not(target_os = "none"))]
-type Lookup = crc::Table<1>;
+/// CRC-32C of all that the controller keeps.
+pub static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// Both slots, one after the other; offsets count from the start of slot 0. A word may be programmed again as long as
 /// bits only fall (RM0090 rev. 21, section 3.6.4).
@@ -107,7 +103,6 @@ pub enum Contents {
 
 impl Image {
     /// Reads a slot.
-    #[inline(never)]
     pub fn read(flash: &impl Flash, slot: u8) -> Self {
         let mut image = Self([0xff; USED]);
         flash.read(at(slot, 0), &mut image.0);
@@ -167,7 +162,6 @@ fn at(slot: u8, offset: usize) -> u32 {
 }
 
 /// Programs a word and reads it back.
-#[inline(never)]
 fn program(
     flash: &mut impl Flash,
     slot: u8,

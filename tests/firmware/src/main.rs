@@ -57,7 +57,7 @@ const CHECKS: &[(&str, Check)] = &named! {
     bus: received_frames_without_room, off_for_less_than_a_tick, goes_and_comes_back,
         aborted_on_the_wire, an_answer_waits_alone;
     zero: over_resets, lost;
-    start: supply_that_comes_late, slow_crystal, no_crystal, silent_after_bus_off, pll_dead, can_dead, the_board,
+    start: supply_that_comes_late, slow_crystal, no_crystal, parameters_change, silent_after_bus_off, pll_dead, can_dead, the_board,
         crashes;
     parameters: one_usable, unusable;
     commands: order_and_age, identify, any_length_code;

@@ -6,9 +6,9 @@ use crate::image::FLASH;
 use crate::machine::Cost;
 
 /// Flash that the program may take, bytes.
-const TEXT_BYTES_MAX: usize = 48 << 10;
+const TEXT_BYTES_MAX: usize = 96 << 10;
 /// RAM that statics and stack may take, bytes.
-pub const RAM_BYTES_MAX: usize = 9 << 10;
+pub const RAM_BYTES_MAX: usize = 18 << 10;
 /// An interrupt may block for a tenth of a period, us.
 const BLOCKED_US_MAX: f64 = 200.0;
 /// The fastest clock with data at the core in time, Hz.

@@ -78,6 +78,31 @@ pub fn slow_crystal(bench: &Bench) {
     no_resets(&machine);
 }
 
+/// A bit of the parameters in RAM flips: the program resets and loads them again.
+pub fn parameters_change(bench: &Bench) {
+    let constants = bench.image.range("local_init_loaded").expect("a static");
+    for word in [10, 60, 110] {
+        let mut machine = bench.running(700);
+        let at = tick_now(&machine);
+        machine.flip(constants.start, 32 * word + 20);
+        let seen = Seen::after(&mut machine, 600);
+        assert_eq!((machine.panics, machine.watchdog_resets), (1, 0));
+        assert_eq!(reported_fault(&seen), Some([6, 0, 0]));
+        let reported = seen.first_state(flag::WATCHDOG_RESET).expect("no report");
+        let ticks = reported - at;
+        let wrong = wrong_valid(&seen.axes, &bench.poses, 1) as u64;
+        println!("FAULT   a bit of parameters in RAM flips | {ticks} | {wrong}");
+        assert!(ticks < 280 && wrong < 280);
+        let late: Vec<_> = seen
+            .axes
+            .into_iter()
+            .filter(|axis| axis.tick > reported)
+            .collect();
+        assert_eq!(wrong_valid(&late, &bench.poses, 1), 0);
+        assert!(valid(&late) > 1000);
+    }
+}
+
 /// Without a crystal the internal oscillator serves; flag, check and light show it. The crystal is absent,
 /// stops while the program runs (a restart), or the PLL does not lock to it (one reset by the watchdog).
 pub fn no_crystal(bench: &Bench) {
