@@ -270,10 +270,12 @@ fn unexplained_finding(
     fault: Option<&Fault>,
     predicted: &Predicted,
 ) -> Option<Finding> {
-    let ratio = predicted.cost_of([0, 1, 2].map(|axis| variances[axis] + drifts[axis]));
+    // Other errors of the parameters cancel a part of them.
+    let cost = |variances| predicted.cost_of(variances).min(predicted.worst_ratio());
+    let ratio = cost([0, 1, 2].map(|axis| variances[axis] + drifts[axis]));
     let severity = match predicted.worst_ratio() <= GOOD_MAX {
         true => Severity::Note,
-        false => severity(predicted.cost_of(variances)).max(Severity::Warn),
+        false => severity(cost(variances)).max(Severity::Warn),
     };
     let found = Finding::new(Kind::Inconsistent { ratio }).with_severity(severity);
     let found = Finding {
