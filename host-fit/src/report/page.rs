@@ -237,17 +237,19 @@ impl Source<'_> {
             let noise = self.subject.diagnosis.predicted.as_ref()?.noise(k);
             Some(format!("{:.2}", LIMITED_MAX * noise * 1e6))
         });
-        let rule = match (limits.as_str(), is_guarded) {
-            ("", _) => "simple acceptance (JCGM 106)".to_owned(),
+        let of_noise = format!("{LIMITED_MAX:.2} times the noise of the sensors: {noise}");
+        match (limits.as_str(), is_guarded) {
+            ("", _) => {
+                format!("simple acceptance (JCGM 106): rms errors in service at most {of_noise}")
+            }
             (limits, false) => format!(
-                "simple acceptance (JCGM 106): rms errors in service at most at the limit: {limits}"
+                "simple acceptance (JCGM 106): rms errors in service at most at the limit: {limits}; and at most {of_noise}"
             ),
             (limits, true) => format!(
-                "guarded acceptance (JCGM 106): rms errors in service at most at the limit less a guard band: {limits}. The guard \
-                 band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
+                "guarded acceptance (JCGM 106): rms errors in service at most at the limit less a guard band: {limits}; and at most \
+                 {of_noise}. The guard band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
             ),
-        };
-        format!("{rule}; and at most {LIMITED_MAX:.2} times the noise of the sensors: {noise}")
+        }
     }
 
     /// Temperatures of the log, and how far from the temperature of calibration the errors hold.
