@@ -61,7 +61,7 @@ struct Cli {
     /// Print errors only.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Print how long each step takes.
+    /// Show all figures, and the time of each step.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     verbose: bool,
 }

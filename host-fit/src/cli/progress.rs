@@ -1,4 +1,4 @@
-//! How far long work is: a bar with rate and time left on standard error. Only a terminal shows it, and
+//! How far long work is: a bar with the time left on standard error. Only a terminal shows it, and
 //! only work that takes over a second has one.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -13,7 +13,7 @@ static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// Shorter work has no bar.
 const SHOWN_AFTER: Duration = Duration::from_secs(1);
-const TEMPLATE: &str = "{msg:<9} {wide_bar} {percent:>3} %  {per_sec}  {eta} left";
+const TEMPLATE: &str = "{msg:<9} {wide_bar} {percent:>3} %  {eta} left";
 
 /// From now on long work has a bar.
 pub(super) fn want() {
