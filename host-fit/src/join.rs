@@ -22,6 +22,7 @@ pub use error::JoinError;
 use crate::bus::BusAddress;
 use crate::bus::bus_log::BusCounts;
 use crate::output::Output;
+use hallstage_input::finding::Finding;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
@@ -62,8 +63,8 @@ pub(crate) struct JoinSettings {
 pub struct JoinReport {
     /// Frames and ticks of a record of the bus.
     pub bus: Option<BusCounts>,
-    /// Rows of a table of the sensors that were left out.
-    pub skipped_rows: usize,
+    /// Warnings of a table of the sensors.
+    pub warnings: Vec<Finding>,
     /// Rows of the reference.
     pub reference: ReferenceCounts,
     /// Offset between the clocks.
@@ -129,7 +130,7 @@ pub(crate) fn run(settings: &JoinSettings, watch: Watch<'static>) -> Result<Join
     log.finish()?;
     Ok(JoinReport {
         bus: sensors.bus,
-        skipped_rows: sensors.skipped_rows,
+        warnings: sensors.warnings,
         reference: reference.counts,
         offset,
         join,

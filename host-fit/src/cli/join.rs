@@ -74,6 +74,7 @@ pub(super) fn run(args: &JoinArgs) -> Result<(), HostError> {
     super::check_outputs([Some(args.out.as_path())], None, inputs)?;
     let report = join::run(&args.settings(), interrupt::watch())?;
     terminal::print(&as_text(&figures(&report).tables()))?;
+    terminal::show(&report.warnings);
     let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";
     terminal::warn(
         report
@@ -87,7 +88,6 @@ pub(super) fn run(args: &JoinArgs) -> Result<(), HostError> {
 fn figures(report: &JoinReport) -> Group {
     let JoinReport {
         bus,
-        skipped_rows,
         reference,
         offset,
         join,
@@ -97,7 +97,7 @@ fn figures(report: &JoinReport) -> Group {
     let ends = |ends: [f64; 2]| ends.into_iter().map(us).collect::<Figure>();
     let sensors = match bus {
         Some(bus) => bus_figures(bus),
-        None => group! { "rows left out" => *skipped_rows },
+        None => Group::default(),
     };
     group! {
         "sensors" => sensors,

@@ -37,7 +37,7 @@ pub(super) struct LiveArgs {
     /// Seconds from line to line, where lines are shown.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     every: Duration,
-    /// Show a line every second, as where the output is no terminal, and no scope.
+    /// Show lines on a terminal, too, in place of the scope.
     #[arg(long)]
     plain: bool,
     /// Give up a tick if frames are still missing after this time.

@@ -4,6 +4,7 @@ use super::node_clock::Tick;
 use super::{JoinError, JoinSettings, bus_reader};
 use crate::bus::bus_log::BusCounts;
 use hallstage_input::dataset::Row;
+use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::log::header::Header;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::table::Table;
@@ -30,8 +31,8 @@ pub(super) struct Sensors {
     pub(super) period_us: f64,
     /// Contents of a record of the bus.
     pub(super) bus: Option<BusCounts>,
-    /// Rows of a table that were left out.
-    pub(super) skipped_rows: usize,
+    /// Warnings of a table.
+    pub(super) warnings: Vec<Finding>,
 }
 
 impl Sensors {
@@ -56,7 +57,7 @@ impl Sensors {
             ticks: run.ticks,
             period_us: stage.servo_period_s * 1e6,
             bus: Some(bus),
-            skipped_rows: 0,
+            warnings: Vec::new(),
         })
     }
 
@@ -99,14 +100,16 @@ impl Sensors {
             ticks.push(tick);
         }
         let period_us = rows.period_us();
-        let end = rows.end()?;
+        let mut warnings = rows.end()?.warnings;
+        // The reference has the movements.
+        warnings.retain(|found| !matches!(found.kind, Kind::MovementsByTime { .. }));
         Ok(Self {
             start_us: ticks.first().map_or(0.0, |tick| tick.t_us),
             recorder_us: 0.0,
             ticks,
             period_us,
             bus: None,
-            skipped_rows: end.skipped_rows,
+            warnings,
         })
     }
 

@@ -1,7 +1,6 @@
 //! A scope on a log, also while the log grows.
 
 use super::{History, Scale, ScopeRow, Screen, Wish};
-use hallstage_input::channel::Channel;
 use hallstage_input::dataset::Row;
 use hallstage_input::log::layout::LogLayout;
 use hallstage_input::log::table::Table;
@@ -10,6 +9,7 @@ use hallstage_input::source::{SourceError, SourceProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 use nalgebra::Vector3;
+use runtime::frame::CodeWindow;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -18,6 +18,9 @@ use std::time::Duration;
 
 /// Time between two looks at the log and the keys.
 const LOOK: Duration = Duration::from_millis(100);
+
+/// Rows that show their period.
+const PERIOD_ROWS: usize = 3;
 
 /// Rows that cannot be read are left out, rows at a rail are shown.
 const OPTIONS: ReadOptions = ReadOptions {
@@ -61,21 +64,32 @@ pub fn run(path: &Path, stage: &Stage, stop: &AtomicBool) -> Result<(), ScopeErr
 }
 
 fn scales(stage: &Stage) -> [Scale; 6] {
-    [0, 1, 2, 3, 4, 5].map(|sensor| {
-        let converter = if sensor < 3 {
-            &stage.hall
-        } else {
-            &stage.capacitive
-        };
-        Scale {
-            // Hall probes, beams, gaps.
-            channel: Channel::SINGLE[if sensor < 3 { sensor } else { sensor + 3 }],
-            per_code: 1e6 * converter.m_per_count,
-            unit: "\u{b5}m",
-            window: converter.window,
-        }
-    })
+    let converters = [&stage.hall, &stage.capacitive];
+    Scale::six(
+        "\u{b5}m",
+        converters.map(|converter| (1e6 * converter.m_per_count, converter.window)),
+    )
 }
+
+/// A scale of a vertical pose in nm or nrad.
+const fn of_pose(name: &'static str, unit: &'static str) -> Scale {
+    Scale {
+        name,
+        per_code: 1e-3,
+        unit,
+        window: CodeWindow {
+            low: i32::MIN,
+            high: i32::MAX,
+        },
+    }
+}
+
+/// The scales of a vertical pose.
+const POSE: [Scale; 3] = [
+    of_pose("Z", "\u{b5}m"),
+    of_pose("Rx", "\u{b5}rad"),
+    of_pose("Ry", "\u{b5}rad"),
+];
 
 /// A log that is read to its last whole line, again and again.
 struct GrowingLog<'s> {
@@ -121,7 +135,9 @@ impl<'s> GrowingLog<'s> {
         let mut rows = LogRows::new(text, "reading", self.stage, &OPTIONS)?;
         let has_reference = rows.has_reference();
         let plane = self.stage.geometry().plane();
-        history.period_s = 1e-6 * rows.period_us();
+        if bytes.iter().filter(|byte| **byte == b'\n').count() > PERIOD_ROWS {
+            history.period_s = 1e-6 * rows.period_us();
+        }
         while let Some(found) = rows.next_row()? {
             let Row {
                 t_us,
@@ -131,10 +147,10 @@ impl<'s> GrowingLog<'s> {
                 ..
             } = found.row;
             let hall = frame.hall();
-            // A log of a pose has no codes of gaps: nm and nrad stand in their place.
-            let gaps = frame
-                .capacitive()
-                .unwrap_or_else(|| vertical.map(|x| (1e9 * x) as i32));
+            let gaps = frame.capacitive().unwrap_or_else(|| {
+                history.scales[3..].copy_from_slice(&POSE);
+                vertical.map(|x| (1e9 * x) as i32)
+            });
             history.push(ScopeRow {
                 t_us: t_us as f64,
                 codes: [hall[0], hall[1], hall[2], gaps[0], gaps[1], gaps[2]],
@@ -147,11 +163,17 @@ impl<'s> GrowingLog<'s> {
     /// The whole lines that were added; all of a file that is packed.
     fn new_lines(&mut self) -> io::Result<Vec<u8>> {
         let mut file = File::open(&self.path)?;
+        if file.metadata()?.len() < self.taken {
+            // The log begins anew.
+            (self.taken, self.head) = (0, None);
+        }
         file.seek(SeekFrom::Start(self.taken))?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let is_packed = self.taken == 0 && bytes.starts_with(&[0x1f, 0x8b]);
-        if !is_packed {
+        // Gzip and UTF-16 cannot be cut at a byte.
+        let marks: [&[u8]; 3] = [&[0x1f, 0x8b], &[0xff, 0xfe], &[0xfe, 0xff]];
+        let is_whole = self.taken == 0 && marks.iter().any(|mark| bytes.starts_with(mark));
+        if !is_whole {
             let whole = bytes
                 .iter()
                 .rposition(|byte| *byte == b'\n')

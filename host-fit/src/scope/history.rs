@@ -10,7 +10,8 @@ const ROWS_MAX: usize = 1 << 20;
 const WINDOW_MIN: usize = 64;
 /// Rows of the first window: four seconds at 500 Hz.
 const WINDOW: usize = 2048;
-/// A motion shows the direction of a probe from this correlation with the reference on.
+/// A motion shows the direction of a probe from this range, m, and from this correlation with the reference on.
+const MOTION_MIN_M: f64 = 1e-5;
 const CLEAR: f64 = 0.8;
 
 /// One row for a scope.
@@ -125,7 +126,11 @@ impl History {
                 let designed_m = row.designed_m?;
                 Some((f64::from(row.codes[probe]), designed_m[other]))
             });
-            correlation(&pairs.collect::<Vec<_>>())
+            let pairs: Vec<(f64, f64)> = pairs.collect();
+            let designed = || pairs.iter().map(|(_, designed_m)| *designed_m);
+            let range_m = designed().fold(f64::MIN, f64::max) - designed().fold(f64::MAX, f64::min);
+            let is_clear = pairs.len() >= WINDOW_MIN && range_m > MOTION_MIN_M;
+            is_clear.then(|| correlation(&pairs)).flatten()
         };
         let of = [correlation(0)?, correlation(1)?, correlation(2)?];
         let strongest = (0..3).max_by(|a, b| of[*a].abs().total_cmp(&of[*b].abs()))?;
@@ -158,30 +163,17 @@ fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use hallstage_input::channel::Channel;
     use runtime::frame::CodeWindow;
     use std::f64::consts::TAU;
 
     /// Without rows, in um of 0.1 a code.
     pub(in crate::scope) fn empty() -> History {
-        let channels = [
-            Channel::HallA,
-            Channel::HallB,
-            Channel::HallC,
-            Channel::Gap1,
-            Channel::Gap2,
-            Channel::Gap3,
-        ];
-        let scale = |channel| Scale {
-            channel,
-            per_code: 0.1,
-            unit: "\u{b5}m",
-            window: CodeWindow {
-                low: -9_999,
-                high: 9_999,
-            },
+        let window = CodeWindow {
+            low: -9_999,
+            high: 9_999,
         };
-        History::new("run.csv".to_owned(), channels.map(scale), 0.002)
+        let scales = Scale::six("\u{b5}m", [(0.1, window); 2]);
+        History::new("run.csv".to_owned(), scales, 0.002)
     }
 
     /// A row of a stage that moves; `sense` is how each probe follows its designed reading.
@@ -214,6 +206,20 @@ pub(super) mod tests {
             let said = [0, 1, 2].map(|probe| history.wires(probe));
             assert_eq!(said.each_ref().map(Option::as_deref), want);
         }
+    }
+
+    #[test]
+    fn noise_of_a_stage_at_rest_names_no_probe() {
+        let mut history = empty();
+        let at_rest = |k: u32| ScopeRow {
+            designed_m: Some([1e-9 * f64::from(k); 3]),
+            ..row(k, |[a, b, c]| [-a, -b, -c])
+        };
+        (0..500).for_each(|k| history.push(at_rest(k)));
+        assert_eq!(
+            [0, 1, 2].map(|probe| history.wires(probe)),
+            [None, None, None]
+        );
     }
 
     #[test]

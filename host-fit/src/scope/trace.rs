@@ -1,6 +1,5 @@
 //! One trace of a scope: the codes of a sensor, and their properties without a model.
 
-use hallstage_input::channel::Channel;
 use hallstage_input::channels::{NOISY, white_noise};
 use hallstage_input::statistics::median;
 use realfft::RealFftPlanner;
@@ -16,14 +15,32 @@ const STILL_S: f64 = 0.1;
 /// The scale of a sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// The sensor.
-    pub channel: Channel,
+    /// The name of the sensor.
+    pub name: &'static str,
     /// What a code stands for, in `unit`.
     pub per_code: f64,
     /// The unit of the display.
     pub unit: &'static str,
     /// Codes between the rails of the converter.
     pub window: CodeWindow,
+}
+
+/// The names of the six sensors.
+const NAMES: [&str; 6] = ["Hall A", "Hall B", "Hall C", "Gap 1", "Gap 2", "Gap 3"];
+
+impl Scale {
+    /// Of the Hall probes and of the gaps: in `unit`, per code of each, with the codes of their converters.
+    pub fn six(unit: &'static str, [hall, gaps]: [(f64, CodeWindow); 2]) -> [Self; 6] {
+        [0, 1, 2, 3, 4, 5].map(|sensor| {
+            let (per_code, window) = if sensor < 3 { hall } else { gaps };
+            Self {
+                name: NAMES[sensor],
+                per_code,
+                unit,
+                window,
+            }
+        })
+    }
 }
 
 /// What the codes of a window show, in the unit of their scale.
@@ -130,7 +147,7 @@ mod tests {
     use super::*;
 
     const SCALE: Scale = Scale {
-        channel: Channel::HallA,
+        name: "Hall A",
         per_code: 0.1,
         unit: "um",
         window: CodeWindow {

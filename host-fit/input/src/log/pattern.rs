@@ -18,7 +18,7 @@ const COUNTER_BITS: [i32; 3] = [16, 24, 32];
 pub enum Pattern {
     /// Times repeat, because they have too few digits.
     #[error(
-        "the row repeats the time of the row above, because the times have too few digits; write all digits, or read the number of the row with `time = {{ column = \"..\", unit = \"rows\" }}` in the [log] table of stage.toml"
+        "the row repeats the time of the row above: the times have too few digits, or rows are written twice; write each row once with all digits, or read the number of the row with `time = {{ column = \"..\", unit = \"rows\" }}` in the [log] table of stage.toml"
     )]
     CoarseTimes,
     /// Negative codes are written as large ones.
@@ -190,7 +190,8 @@ impl Pattern {
     /// Of codes that this converter cannot give: a sound log crosses zero in small steps.
     fn of_codes(codes: &[f64], code_max: i32) -> Self {
         let half = f64::from(code_max) + 1.0;
-        if !codes.iter().all(|code| (0.0..2.0 * half).contains(code)) {
+        let are_unsigned = codes.iter().all(|code| (0.0..2.0 * half).contains(code));
+        if code_max <= 0 || !are_unsigned {
             return Self::OtherCodes;
         }
         let jumps = codes

@@ -113,9 +113,11 @@ impl Preamble {
             };
             Place::new(path, first.map(|line| line.line)).refuse(problem)
         })?;
-        // Facts and units of the columns stand between the header and the rows.
+        // Facts and units of the columns stand between the header and the rows. A fact begins with a word.
+        let begins_with_word = |line: &Line| line.names.first().is_some_and(is_word);
+        let has_facts = !first_row.is_some_and(begins_with_word);
         let is_fact = |line: &Line| {
-            line.is_units() || (is_above(line) && line.names.first().is_some_and(is_word))
+            line.is_units() || (has_facts && is_above(line) && begins_with_word(line))
         };
         let row = lines
             .iter()
@@ -203,13 +205,15 @@ fn is_word(cell: &String) -> bool {
 
 /// What separates the cells: most lines agree on their number.
 fn separator(lines: &[TextLine<'_>]) -> u8 {
+    // The number of lines that agree, and of separators in each.
     let agree = |separator: &u8| {
         let mut lines_of: BTreeMap<usize, usize> = BTreeMap::new();
         for line in lines {
             let count = line.text.iter().filter(|byte| *byte == separator).count();
             *lines_of.entry(count).or_default() += usize::from(count > 0);
         }
-        lines_of.into_values().max().unwrap_or_default()
+        let most = lines_of.into_iter().map(|(count, lines)| (lines, count));
+        most.max().unwrap_or_default()
     };
     let best = |one: u8, other: u8| {
         if agree(&other) > agree(&one) {
@@ -315,10 +319,14 @@ mod tests {
             let text = format!("a,b,c\n{bad}\n1,2,3\n4,5,6");
             assert_eq!(read(&text).above, 1, "{bad}");
         }
+        // Also below rows that begin with a word.
+        let rows = "ok,1,2,3\nok,4,5,6\nok,,,\nok,1,2,3\nok,1,2,3\nok,1,2,3\n";
+        assert_eq!(read(&format!("state,a,b,c\n{rows}")).above, 1);
     }
 
     #[test]
     fn decimal_commas_do_not_separate_cells() {
+        assert_eq!(read("a,b,c;d\n1,2,3;4\n1,2,3;4").separator, b',');
         for text in ["x;y;z\n0,5;1,5;2,5\n1,5;2,5;3,5", "x;y\n0;1,5\n1;2,5"] {
             assert_eq!(read(text).separator, b';', "{text:?}");
         }

@@ -115,7 +115,7 @@ fn iso(text: &str) -> Option<String> {
     let [a, b, c] = parts[..] else { return None };
     let number = |part: &str| part.parse::<u32>().ok();
     let (year, month, day) = match (month(a), month(b)) {
-        _ if a.len() == 4 => (a, number(b).or(month(b))?, number(c)?),
+        _ if a.len() == 4 && number(a).is_some() => (a, number(b).or(month(b))?, number(c)?),
         _ if c.len() != 4 => return None,
         (Some(month), _) => (c, month, number(b)?),
         (_, Some(month)) => (c, month, number(a)?),
@@ -155,8 +155,8 @@ fn duration_us(text: &str) -> Option<f64> {
     };
     let whole = |text: &str| text.parse::<u32>().ok().map(f64::from);
     let (minutes, seconds) = (whole(minutes)?, number(seconds)?);
-    let in_range = |x: &f64| (0.0..60.0).contains(x);
-    in_range(&seconds).then_some(((whole(hours)? * 60.0 + minutes) * 60.0 + seconds) * 1e6)
+    let is_clock = (0.0..60.0).contains(&seconds) && (minutes < 60.0 || parts.len() == 2);
+    is_clock.then_some(((whole(hours)? * 60.0 + minutes) * 60.0 + seconds) * 1e6)
 }
 
 #[cfg(test)]
@@ -199,6 +199,8 @@ mod tests {
         ] {
             assert_eq!(t_us(text), Ok(1_767_323_045_678_901.0), "{text}");
         }
+        assert_eq!(t_us("June 2, 2026 3:00:00"), t_us("2026-06-02 03:00:00"));
+        assert!(t_us("June 2, 2026 3:00:00").is_ok());
         let afternoon = t_us("2026-05-13 15:00:00");
         for text in [
             "5/13/2026 3:00:00 PM",
@@ -240,7 +242,7 @@ mod tests {
         ] {
             assert_eq!(t_us(text), Ok(want), "{text}");
         }
-        for text in ["2 apples", "10:00", "1:60:61", "0.5 V"] {
+        for text in ["2 apples", "10:00", "1:02:61", "1:75:03.5", "0.5 V"] {
             assert!(
                 matches!(t_us(text), Err(CellFault::NotATime { .. })),
                 "{text}"

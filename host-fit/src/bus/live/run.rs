@@ -10,7 +10,6 @@ use crate::output::{OutputError, blob_file, is_standard_output};
 use crate::scope::{History, Scale, ScopeRow, Screen, Wish};
 use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
 use hal_adapters::candump::LogLine;
-use hallstage_input::channel::Channel;
 use runtime::{ParameterSet, RawFrame, Reading};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -325,13 +324,7 @@ struct Scope {
 impl Scope {
     fn open(set: &ParameterSet, settings: &LiveSettings) -> std::io::Result<Self> {
         let (hall, gaps) = (set.constants.hall_window, set.constants.capacitive_window);
-        let scales = [0, 1, 2, 3, 4, 5].map(|sensor| Scale {
-            // Hall probes, beams, gaps.
-            channel: Channel::SINGLE[if sensor < 3 { sensor } else { sensor + 3 }],
-            per_code: 1.0,
-            unit: "codes",
-            window: if sensor < 3 { hall } else { gaps },
-        });
+        let scales = Scale::six("codes", [(1.0, hall), (1.0, gaps)]);
         let title = format!("{} {}", settings.can.interface, set.serial);
         Ok(Self {
             screen: Screen::open()?,

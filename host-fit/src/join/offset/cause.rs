@@ -70,10 +70,11 @@ impl Records<'_> {
             .map(|[_, sp, pp]| self.stage.hall.m_per_count * sp / pp);
         factors.sort_by(f64::total_cmp);
         let factor = factors[1];
-        let is_sound = (FACTOR_MAX.recip()..FACTOR_MAX).contains(&factor);
-        match is_sound || explained < EXPLAINED_MIN * motion || factor <= 0.0 {
-            true => Ok(()),
-            false => Err(JoinError::Unit { factor }),
+        // Without common rows it is no number.
+        let is_size = factor > 0.0 && explained >= EXPLAINED_MIN * motion;
+        match is_size && !(FACTOR_MAX.recip()..FACTOR_MAX).contains(&factor) {
+            true => Err(JoinError::Unit { factor }),
+            false => Ok(()),
         }
     }
 
