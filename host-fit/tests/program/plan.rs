@@ -20,7 +20,7 @@ fn a_stage_that_cannot_follow_the_fast_tone_is_told_what_its_run_lacks() {
         STAGE_TOML.replace("\nz = { service_m = 240e-6", limited),
     );
     let (is_told, error) = planned("usual.toml");
-    assert!(!is_told && error < 0.1, "{error}");
+    assert!(!is_told && error < 0.2, "{error}");
     let (is_told, error) = planned("stiff.toml");
     assert!(is_told && error > 1.0, "{error}");
 }
