@@ -382,7 +382,7 @@ impl Calibration {
         operator: Option<&str>,
         notes: Option<BTreeMap<String, String>>,
     ) -> PyResult<()> {
-        let (of, _) = self.fit_or_raise("report")?;
+        let (of, fit) = self.fit_or_raise("report")?;
         let about = About {
             title: CERTIFICATE,
             serial: &self.set.serial,
@@ -399,7 +399,7 @@ impl Calibration {
             write(
                 &path,
                 about,
-                (log, &self.designed),
+                (log, fit.rows(&log.dataset), &self.designed),
                 stage_file,
                 of.outcome.subject(),
                 (words::messages(&log.warnings), &blob),

@@ -140,7 +140,7 @@ impl Evaluation {
             write(
                 &path,
                 about,
-                (&of.log, &self.designed),
+                (&of.log, &of.log.dataset, &self.designed),
                 stage_file,
                 of.subject(),
                 (self.report.warnings.clone(), &self.blob),

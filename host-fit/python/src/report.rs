@@ -75,11 +75,12 @@ pub struct About<'a> {
     pub call: Vec<OsString>,
 }
 
-/// Writes the page of logs and what was made of them, whole or not at all.
+/// Writes the page of logs and what was made of them, whole or not at all. The errors of the report are of the rows of
+/// `dataset`.
 pub fn write(
     path: &Path,
     about: About,
-    (log, stage): (&LogReading, &Designed),
+    (log, dataset, stage): (&LogReading, &Dataset, &Designed),
     stage_file: Option<&PathBuf>,
     subject: Subject,
     (warnings, blob): (Vec<String>, &[u8]),
@@ -97,7 +98,7 @@ pub fn write(
         subject,
         facts: facts(about.serial, about.operator, Some(about.created), &notes),
         stage,
-        dataset: &log.dataset,
+        dataset,
         provenance,
         warnings,
         report: Some(report),

@@ -109,6 +109,7 @@ impl Evaluation {
             is_refitted: zeros == Zeros::Refit,
             errors: rms(&comparable),
             corrected: corrected.as_ref().map(rms),
+            trusted: decoded.trusted(&log.dataset),
         };
         let usual = if is_field(set) { 3.0 } else { 10.0 };
         let limit = order.limit.unwrap_or(usual);
@@ -122,7 +123,9 @@ impl Evaluation {
                 let predicted = faults.predicted.take();
                 if !apart.is_some_and(are_elsewhere) {
                     let errors = (rms(&comparable), corrected.as_ref().map(rms));
-                    let fast = predicted.and_then(|of| faster(&log.dataset, stage, errors, &of));
+                    let trusted = decoded.trusted(&log.dataset);
+                    let fast = predicted
+                        .and_then(|of| faster((&log.dataset, &trusted), stage, errors, &of));
                     faults.findings.extend(fast);
                 }
                 faults

@@ -92,6 +92,10 @@ impl FitJob<'_> {
             let what = (self.title, self.order.settings.serial.as_str());
             let mut source = page.source(what, logs, log_and_stage, subject);
             source.report = report.as_ref();
+            if let Ok(fit) = &outcome.fitted {
+                // The errors are of the rows of the fit.
+                source.dataset = fit.rows(&log.dataset);
+            }
             if let Some((path, fit)) = kept {
                 let blob = blob_file::to_bytes(path, &fit.set)?;
                 let provenance = &mut source.provenance;

@@ -42,7 +42,7 @@ struct Content {
     budget: Option<Budget>,
     /// SHA-256 of the text of each log that the blob was fitted to.
     logs: Vec<[u8; 32]>,
-    /// The number of its certificate; empty without one.
+    /// The latest number of a certificate; empty without one.
     certificate: String,
 }
 

@@ -170,7 +170,7 @@ impl Source<'_> {
             );
         }
         if !self.certificate.is_empty() {
-            let name = "certificate of the calibration as found".to_owned();
+            let name = "latest certificate of the calibration as found".to_owned();
             facts.insert(1, [name, self.certificate.clone()]);
         }
         facts.extend(self.facts.iter().cloned());

@@ -196,3 +196,18 @@ fn a_log_of_little_motion_is_a_warning() {
     let fit = bench.good("fit log.csv --out p.bin --model field");
     assert_eq!(stderr(&fit), "");
 }
+
+/// Its rows at the ends of a movement have no reference after the lag is taken off.
+#[test]
+fn a_late_probe_is_charged_by_check_and_by_eval_and_has_a_page() {
+    let bench = Bench::new();
+    bench.good("plan --seconds 20 --out run.csv");
+    bench.good("simulate --plan run.csv --seed 4 --out log.csv");
+    bench.good("fit log.csv --out p.bin");
+    bench.good("simulate --plan run.csv --seed 4 --probe-lag-us 1000,0,0 --out late.csv");
+    let said = bench.good("check late.csv --report page");
+    says(stderr(&said), "declares for service, errors are");
+    assert!(bench.has("page/index.html"));
+    bench.good("simulate --protocol service --seed 4 --probe-lag-us 1000,0,0 --out service.csv");
+    bench.bad("eval p.bin service.csv", 4, &["beyond the limit"]);
+}

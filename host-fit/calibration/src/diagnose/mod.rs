@@ -313,7 +313,7 @@ impl Diagnosis {
 }
 
 /// The relation of a blob to the log of its diagnosis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum BlobUse {
     /// It was recalibrated by the log, with these errors to expect in service.
     Recalibrated(Option<Predicted>),
@@ -325,6 +325,8 @@ pub enum BlobUse {
         errors: [f64; 3],
         /// The same with the correction for motion, if the blob has one.
         corrected: Option<[f64; 3]>,
+        /// Rows that show motion: see [`Decoded::trusted`](crate::judge::Decoded::trusted).
+        trusted: Vec<bool>,
     },
 }
 
@@ -362,26 +364,28 @@ pub fn diagnose_blob(
     let temperature = &set.constants.temperature;
     out.findings
         .extend(temperature::missing(temperature, dataset));
-    let basis = match blob_use {
-        BlobUse::Recalibrated(Some(predicted)) => {
-            out.predicted = Some(predicted);
-            Basis::Recalibrated
-        }
-        BlobUse::Recalibrated(None) => Basis::Blob { is_for_service },
-        BlobUse::Evaluated {
-            is_refitted,
-            errors,
-            corrected,
-        } => {
-            let at_work = out.predicted.as_ref().filter(|_| is_for_service);
-            out.findings.extend(
-                at_work.and_then(|of| range::faster(dataset, stage, (errors, corrected), of)),
-            );
-            let rezero = temperature::rezero(temperature, dataset, is_refitted);
-            out.findings.extend(rezero);
-            Basis::Blob { is_for_service }
-        }
-    };
+    let basis =
+        match blob_use {
+            BlobUse::Recalibrated(Some(predicted)) => {
+                out.predicted = Some(predicted);
+                Basis::Recalibrated
+            }
+            BlobUse::Recalibrated(None) => Basis::Blob { is_for_service },
+            BlobUse::Evaluated {
+                is_refitted,
+                errors,
+                corrected,
+                trusted,
+            } => {
+                let at_work = out.predicted.as_ref().filter(|_| is_for_service);
+                out.findings.extend(at_work.and_then(|of| {
+                    range::faster((dataset, &trusted), stage, (errors, corrected), of)
+                }));
+                let rezero = temperature::rezero(temperature, dataset, is_refitted);
+                out.findings.extend(rezero);
+                Basis::Blob { is_for_service }
+            }
+        };
     let columns = ColumnFaults::new(&out.columns, dataset, stage, parameters);
     out.findings.extend(columns.findings);
     out.conclude(columns.stays, basis);

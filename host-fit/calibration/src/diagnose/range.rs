@@ -46,14 +46,14 @@ pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Findi
 }
 
 /// A log that moves faster than service does by `[motion]`: the verdict is about the declared motion. The errors on such a
-/// log, as they are and corrected for motion, say what faster service has to expect.
+/// log, as they are and corrected for motion, say what faster service has to expect. Only the `trusted` rows show motion.
 pub fn faster(
-    dataset: &Dataset,
+    (dataset, trusted): (&Dataset, &[bool]),
     stage: &Stage,
     (errors, corrected): ([f64; 3], Option<[f64; 3]>),
     predicted: &Predicted,
 ) -> Option<Finding> {
-    let rows = measured_motion(dataset, &vec![true; dataset.rows.len()]);
+    let rows = measured_motion(dataset, trusted);
     let axes = &stage.motion.axes;
     let square = |x: f32, axis: usize| (f64::from(x) * ARMS_M[axis]).powi(2);
     let of_log = |of: &dyn Fn(&CommandedMotion) -> f64| {

@@ -104,7 +104,7 @@ impl Decoded {
     }
 
     /// The rows with errors near the errors around them. A row where the reference jumps for a moment is not among them.
-    fn trusted(&self, dataset: &Dataset) -> Vec<bool> {
+    pub fn trusted(&self, dataset: &Dataset) -> Vec<bool> {
         const AROUND: usize = 2;
         let jump = |row: usize| {
             let rows = &dataset.movements[dataset.rows[row].movement].rows;

@@ -24,7 +24,7 @@ pub struct StoredPosterior {
     pub budget: Option<Budget>,
     /// SHA-256 of the text of each log that the blob was fitted to.
     pub logs: Vec<[u8; 32]>,
-    /// The number of its certificate; empty without one.
+    /// The latest number of a certificate of it or of the calibrations before it; empty without one.
     pub certificate: String,
 }
 
@@ -47,16 +47,16 @@ impl StoredPosterior {
         })
     }
 
-    /// The same of a blob that was fitted to these logs, too. Its certificate has the number of `[certificate]`, unless an
-    /// earlier one has it.
+    /// The same of a blob that was fitted to these logs, too. A number in `[certificate]` becomes the latest number of a
+    /// certificate, which no later document can have.
     #[must_use]
     pub fn with_log(&self, dataset: &Dataset, stage: &Stage) -> Self {
         let mut logs = self.logs.clone();
         logs.extend(dataset.logs.iter().map(|log| log.sha256));
         let [number, ..] = &stage.certificate.texts;
-        let certificate = match *number == self.certificate {
-            true => String::new(),
-            false => number.clone(),
+        let certificate = match number.as_str() {
+            "" => self.certificate.clone(),
+            number => number.to_owned(),
         };
         Self {
             logs,

@@ -5,19 +5,29 @@ use hallstage_input::log::LogRow;
 use hallstage_solver::estimator::derivatives::SIDE_US;
 use hallstage_solver::estimator::rows::measured_motion;
 use runtime::CommandedMotion;
+use runtime::frame::CodeWindow;
 
 /// Rows that wait at most.
 const PIECE_ROWS: usize = 8192;
 
 /// Rows of a movement, with the commanded pose as reference. The last ones wait for the next rows, which give speed and
 /// acceleration.
-#[derive(Default)]
 pub(super) struct Commanded {
+    /// Codes of the gaps that show motion.
+    gaps: CodeWindow,
     rows: Vec<LogRow>,
     waiting: usize,
 }
 
 impl Commanded {
+    pub(super) const fn new(gaps: CodeWindow) -> Self {
+        Self {
+            gaps,
+            rows: Vec::new(),
+            waiting: 0,
+        }
+    }
+
     /// Takes a row, and gives the rows of known motion.
     pub(super) fn take(&mut self, row: LogRow) -> Vec<(LogRow, CommandedMotion)> {
         let is_due = row.begins || self.waiting >= PIECE_ROWS;
@@ -41,7 +51,12 @@ impl Commanded {
             movements: vec![Movement { log, index, rows }],
             ..Dataset::default()
         };
-        let motion = measured_motion(&dataset, &vec![true; dataset.rows.len()]);
+        let is_sound = |row: &LogRow| {
+            let gaps = row.row.frame.capacitive();
+            gaps.is_none_or(|codes| codes.iter().all(|code| self.gaps.contains(*code)))
+        };
+        let sound: Vec<bool> = self.rows.iter().map(is_sound).collect();
+        let motion = measured_motion(&dataset, &sound);
         let known = self.rows[first..next].iter().copied();
         let known = known.zip(motion.into_iter().skip(first)).collect();
         self.waiting = self.rows.len() - next;

@@ -84,7 +84,7 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
     };
     let mut log = LogRows::open(log, "decoding", stage, &options)?;
     let correction = settings.correction.filter(|_| log.has_reference());
-    let mut commanded = Commanded::default();
+    let mut commanded = Commanded::new(stage.capacitive.window);
     let mut bytes = settings.header(0);
     let rows = loop {
         let (ready, over) = match log.next_row() {

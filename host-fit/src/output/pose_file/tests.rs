@@ -222,7 +222,13 @@ fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
     for row in 0..rows {
         let t_s = 2e-3 * f64::from(row);
         let sine = (per_s * t_s).sin();
-        let (x_m, gap) = (amplitude * sine, (5000.0 * sine).round());
+        // One row has a gap at the rail, which is no motion.
+        let gap = if row == 777 {
+            32767.0
+        } else {
+            (5000.0 * sine).round()
+        };
+        let x_m = amplitude * sine;
         log += &format!(
             "0,{},{gap},{gap},{gap},1000,200,-300,{x_m:e},0,0\n",
             2000 * row
@@ -260,7 +266,7 @@ fn a_log_with_the_commanded_pose_is_corrected_at_every_row() {
     ];
     for (row, (corrected, plain)) in corrected.iter().zip(&plain).enumerate() {
         // At the ends of the log one side is missing.
-        if !(20..rows as usize - 20).contains(&row) {
+        if !(20..rows as usize - 20).contains(&row) || row == 777 {
             continue;
         }
         let added = [

@@ -36,12 +36,12 @@ struct Stays {
     sensors: Vec<(usize, Follows, f64)>,
     /// Whether all errors that follow the motion are forms of sensors.
     are_forms: bool,
-    /// Lags of A, B, C, s, unless they are among these errors.
+    /// Lags of A, B, C, s, for the motion of a fit, unless they are among these errors.
     probe_lags_s: [f64; 3],
 }
 
 impl Stays {
-    fn new(faults: &[Fault], sizes: &[f64]) -> Self {
+    fn new(faults: &[Fault], sizes: &[f64], is_fitted: bool) -> Self {
         let (mut sensors, mut are_forms, mut probe_lags_s) = (Vec::new(), true, [0.0; 3]);
         for (Fault { suspect, .. }, size) in faults.iter().zip(sizes) {
             for channel in suspect.channels() {
@@ -64,8 +64,8 @@ impl Stays {
         }
         let mean_s = probe_lags_s.iter().sum::<f64>() / 3.0;
         probe_lags_s = probe_lags_s.map(|lag_s| lag_s - mean_s);
-        if !sensors.is_empty() {
-            // Lags of the probes add to the other errors.
+        if !sensors.is_empty() || !is_fitted {
+            // Lags of the probes add to the other errors, and a blob has no motion of a fit that counts them.
             let lags_s = std::mem::take(&mut probe_lags_s).into_iter().enumerate();
             sensors.extend(lags_s.map(|(probe, s)| (probe, Follows::OwnSpeed, 1e3 * s)));
         }
@@ -97,7 +97,7 @@ impl Finder<'_> {
         let inflation = residual.max(1.0).powi(2);
         let covariance = estimate.covariance() * inflation;
         let bent = self.own_curvature(estimate)?;
-        let stays = Stays::new(faults, estimate.sizes());
+        let stays = Stays::new(faults, estimate.sizes(), by.is_fitted);
         // The noise of what is estimated beside the parameters.
         let systematic = |covariance: &DMatrix<f64>| declared.variance(covariance).systematic;
         let [with, without] = [&estimate.curvature, &bent].map(|of| systematic(&of.inverse()));
