@@ -21,6 +21,8 @@ use std::path::Path;
 pub const MARK: &str = "# FILL IN: ";
 /// Number of rows that are read for the period and the codes of a log.
 const ROWS_MAX: usize = 10_000;
+/// Periods that a servo may have, s. Another one shows that the unit of the time is wrong.
+const PERIODS_S: std::ops::RangeInclusive<f64> = 1e-4..=0.1;
 /// Where the comments of the drafted lines begin.
 const COMMENT_COLUMN: usize = 60;
 /// Codes of a converter of 16 bits and of 24 bits. Larger codes in the log mean 24 bits.
@@ -203,7 +205,8 @@ impl Lines {
         let period_s = columns.iter().find_map(|column| {
             column.quantity.filter(|q| *q == Quantity::Time)?;
             let period_us = column.step()? * column.scale(Dimension::Time)?;
-            Some(period_us.round() / 1e6)
+            let period_s = period_us.round() / 1e6;
+            PERIODS_S.contains(&period_s).then_some(period_s)
         });
         let lines = STAGE_TOML.lines().skip_while(|line| !line.starts_with('['));
         // Search ranges have defaults.

@@ -61,6 +61,14 @@ pub enum JoinError {
         /// What a cubic between the samples misses, um.
         rms_um: f64,
     },
+    /// The reference repeats its values.
+    #[error(
+        "the reference holds each value for {rows:.0} rows; log its new values alone, or each of its samples"
+    )]
+    ReferenceHeld {
+        /// Rows from one new value to the next.
+        rows: f64,
+    },
     /// A column is not what stage.toml says.
     #[error(
         "with {change} the reference explains {percent:.0} % of the Hall signals' motion, and {without_percent:.0} % without; correct the \

@@ -107,6 +107,9 @@ const STRETCH_US: f64 = 60e6;
 /// Most minutes of the record that are tried as a start: the reference may have missed the liveliest.
 const MINUTES: usize = 5;
 
+/// Offsets with this part of the largest explained motion explain as much.
+const ALIKE: f64 = 0.98;
+
 /// How far from a given start the offset is searched, us, if nothing else is asked.
 const SEARCH_US: f64 = 2e6;
 
@@ -196,14 +199,7 @@ impl<'r> Records<'r> {
     }
 
     fn range_us(&self, offset_us: Option<f64>, search_us: Option<f64>) -> [f64; 2] {
-        let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(0.0));
-        let tick = |tick: &Tick| tick.t_us;
-        let sample = |sample: &Sample| sample.t_us;
-        let ticks = ends(self.ticks.first().map(tick), self.ticks.last().map(tick));
-        let samples = ends(
-            self.samples.first().map(sample),
-            self.samples.last().map(sample),
-        );
+        let [ticks, samples] = self.ends_us();
         let start_us = match offset_us {
             Some(us) => us - self.recorder_us,
             None => self.start_us - samples[0],
@@ -268,9 +264,40 @@ impl<'r> Records<'r> {
         };
         let trial = |step: u32| (self.explained(&self.rows(&points, &clocks(step)))[0], step);
         let trials: Vec<(f64, u32)> = (0..steps + 1).into_par_iter().map(trial).collect();
-        // The first of equals.
-        let best = trials.iter().rev().max_by(|a, b| a.0.total_cmp(&b.0));
-        clocks(best.map_or(0, |(_, step)| *step))
+        let most = trials.iter().map(|trial| trial.0).fold(0.0, f64::max);
+        // A run that repeats explains as much at several offsets: the records overlap most at the right one.
+        let explained = |at: Option<&(f64, u32)>| at.map_or(0.0, |trial| trial.0);
+        let peaks = (0..trials.len()).filter(|&at| {
+            let own = trials[at].0;
+            let before = explained(at.checked_sub(1).and_then(|at| trials.get(at)));
+            own >= ALIKE * most && own >= before && own > explained(trials.get(at + 1))
+        });
+        let overlap_us = |at: &usize| self.overlap_us(clocks(trials[*at].1).us);
+        let best = peaks.max_by(|a, b| {
+            let by_overlap = overlap_us(a).total_cmp(&overlap_us(b));
+            by_overlap.then(trials[*a].0.total_cmp(&trials[*b].0))
+        });
+        clocks(best.map_or(0, |at| trials[at].1))
+    }
+
+    /// How long both records last together at an offset, us.
+    fn overlap_us(&self, offset_us: f64) -> f64 {
+        let [[tick, last_tick], [sample, last_sample]] = self.ends_us();
+        (last_tick - offset_us).min(last_sample) - (tick - offset_us).max(sample)
+    }
+
+    /// The first and the last time of both records, us.
+    fn ends_us(&self) -> [[f64; 2]; 2] {
+        let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(0.0));
+        let tick = |tick: &Tick| tick.t_us;
+        let sample = |sample: &Sample| sample.t_us;
+        [
+            ends(self.ticks.first().map(tick), self.ticks.last().map(tick)),
+            ends(
+                self.samples.first().map(sample),
+                self.samples.last().map(sample),
+            ),
+        ]
     }
 
     /// Follows an offset from the first stretch about its middle over the whole record.

@@ -45,12 +45,12 @@ pub struct JoinCounts {
 }
 
 impl JoinCounts {
-    /// Refuses records if most of one has no partner in the other.
+    /// Refuses records if less than half of each has a partner in the other.
     ///
     /// # Errors
     /// `Unpaired`.
     pub(super) fn check(self) -> Result<(), JoinError> {
-        if 2 * self.rows >= self.ticks && 2.0 * self.covered_s >= self.reference_s {
+        if 2 * self.rows >= self.ticks || 2.0 * self.covered_s >= self.reference_s {
             return Ok(());
         }
         Err(JoinError::Unpaired(self))

@@ -57,6 +57,9 @@ struct Value {
     unit: &'static str,
 }
 
+/// A reference that holds its values for more rows than this on average is not sampled in each row.
+const HELD_ROWS: f64 = 1.5;
+
 /// Error of a cubic in the middle between samples, in fourth differences.
 const CUBIC: f64 = 3.0 / 128.0;
 
@@ -165,7 +168,7 @@ impl Reference {
     /// Checks that a cubic through four samples follows the motion: the fourth differences are small.
     ///
     /// # Errors
-    /// `ReferenceTooSlow`.
+    /// `ReferenceTooSlow`, `ReferenceHeld`.
     pub(super) fn check_speed(&self, stage: &Stage) -> Result<(), JoinError> {
         let scale = self
             .quantities
@@ -185,9 +188,15 @@ impl Reference {
                 }
             }
         }
+        let changes = self
+            .samples
+            .windows(2)
+            .filter(|pair| pair[0].values != pair[1].values);
+        let held_rows = self.samples.len() as f64 / (1 + changes.count()) as f64;
         let rms_m = (sum / f64::max(count, 1.0)).sqrt();
         match rms_m <= stage.hall.m_per_count {
             true => Ok(()),
+            false if held_rows > HELD_ROWS => Err(JoinError::ReferenceHeld { rows: held_rows }),
             false => Err(JoinError::ReferenceTooSlow {
                 period_ms: self.period_us * 1e-3,
                 rms_um: rms_m * 1e6,

@@ -58,6 +58,33 @@ fn tables_are_joined_in_any_order_whatever_their_rates_ends_and_gaps() {
     assert_eq!(swapped.run(), report);
 }
 
+/// Three cycles of the same motion: each shift by a cycle explains as much.
+#[test]
+fn a_run_that_repeats_is_joined_where_the_records_overlap_most() {
+    let cycles = |text: &str, time: usize, length_us: f64| {
+        let (head, rows) = text.split_once('\n').expect("a header");
+        let mut all = head.to_owned() + "\n";
+        for cycle in 0..3 {
+            for row in rows.lines() {
+                let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+                let t_us: f64 = cells[time].parse().expect("a number");
+                cells[time] = (t_us + f64::from(cycle) * length_us).to_string();
+                all += &(cells.join(",") + "\n");
+            }
+        }
+        all
+    };
+    let table = cycles(&sensors(0.0, 2_000.0, |_| true), 0, 1.5e6);
+    let ifm = reference().replace("movement", "run");
+    let ifm: String = ifm
+        .lines()
+        .map(|line| line.split_once(',').expect("cells").1.to_owned() + "\n")
+        .collect();
+    let join = tables(&table, &cycles(&ifm, 0, 1.5e6));
+    let found_us = join.run().offset.us - SENSORS_US;
+    assert!(found_us.abs() < 50.0, "{found_us}");
+}
+
 #[test]
 fn a_vertical_pose_in_place_of_codes_goes_through() {
     let table = sensors(0.0, 2_000.0, |_| true);

@@ -100,6 +100,11 @@ pub enum CellFault {
 }
 
 impl CellFault {
+    /// Whether a code is outside the decoded range.
+    pub(super) const fn is_code(&self) -> bool {
+        matches!(self, Self::OutsideConverter { .. } | Self::Saturated { .. })
+    }
+
     /// The reason to leave a row out, in words.
     pub(super) const fn reason(&self) -> &'static str {
         match self {

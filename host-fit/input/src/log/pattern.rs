@@ -163,7 +163,9 @@ impl LogProblem {
     /// Whether it is the same problem of another row.
     fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Cell(one), Self::Cell(other)) => one.reason() == other.reason(),
+            (Self::Cell(one), Self::Cell(other)) => {
+                one.reason() == other.reason() || one.is_code() && other.is_code()
+            }
             _ => discriminant(self) == discriminant(other),
         }
     }
@@ -179,7 +181,10 @@ impl Pattern {
             }
             CellFault::NotWhole { .. } => Self::NotCodes,
             CellFault::Absurd { .. } => Self::TooLarge,
-            CellFault::Saturated { .. } => Self::Saturated,
+            CellFault::Saturated { code } => match numbers.iter().any(|n| *n > f64::from(*code)) {
+                true => Self::of_codes(numbers, *code),
+                false => Self::Saturated,
+            },
             CellFault::OutsideConverter { code_max, .. } => Self::of_codes(numbers, *code_max),
             CellFault::Infinite { .. }
             | CellFault::NotATime { .. }

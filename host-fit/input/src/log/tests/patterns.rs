@@ -102,6 +102,13 @@ fn a_fault_of_many_rows_is_named_by_its_pattern() {
     assert_eq!(pattern(&long(2, |_, nm| format!("{},5", nm / 1000))), cells);
 }
 
+/// The first bad code is at the rail.
+#[test]
+fn offset_binary_is_named_where_codes_cross_zero() {
+    let text = long(8, |k, code| (code - i64::from(k == 0) + 32768).to_string());
+    assert_eq!(pattern(&text), Pattern::OffsetBinary { code_max: 32767 });
+}
+
 #[test]
 fn a_fault_of_few_rows_is_the_fault_of_its_row() {
     let error = refused(&long(8, |k, code| {
