@@ -12,8 +12,9 @@ use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::terms::{ETA, PER_PROBE};
-use jiff::SignedDuration;
 use jiff::civil::{Date, DateTime};
+use jiff::tz::TimeZone;
+use jiff::{SignedDuration, Timestamp};
 use runtime::ParameterSet;
 
 /// A later date is none.
@@ -87,14 +88,19 @@ pub struct Trend {
 }
 
 impl Trend {
-    /// The trend of blobs. Errors have the limits of `[certificate]`, or else 1.30 times the noise floor.
+    /// The trend of blobs. Errors have the limits of `[certificate]` without guard bands, and 1.30 times the noise floor.
     ///
     /// # Errors
     /// See [`TrendError`].
     pub fn new(blobs: &[Blob], stage: &Stage) -> Result<Self, TrendError> {
         let dated = |blob| -> Result<(DateTime, &Blob), TrendError> {
             let (name, set, _): &Blob = blob;
-            let date = set.created.parse().map_err(|_| TrendError::NoDate {
+            let of_zone = |time: Timestamp| TimeZone::UTC.to_datetime(time);
+            let date = set
+                .created
+                .parse()
+                .or_else(|_| set.created.parse().map(of_zone));
+            let date = date.map_err(|_| TrendError::NoDate {
                 name: name.clone(),
                 created: set.created.to_string(),
             });
@@ -143,7 +149,9 @@ impl Trend {
         let errors = calibrations[calibrations.len() - 1].errors;
         let drift = |axis: usize| {
             let usual = budget.map(|of| LIMITED_MAX * of.noise()[axis]);
-            let limit = stage.certificate.limits[axis].or(usual);
+            // The smaller, as a fit takes it.
+            let limits = [stage.certificate.limits[axis], usual];
+            let limit = limits.into_iter().flatten().reduce(f64::min);
             drift(lines[axis], sets.len() - 2, errors[axis], limit)
         };
         Ok(Self {
@@ -216,7 +224,9 @@ fn drift([slope, scatter]: [f64; 2], freedom: usize, error: f64, limit: Option<f
     let days = |per_day: f64| {
         let limit = limit?;
         let room = (limit * limit - error * error).max(0.0).sqrt();
-        Some(room / per_day).filter(|days| *days < DAYS_MAX)
+        // Beyond the limit no drift is needed.
+        let days = if room > 0.0 { room / per_day } else { 0.0 };
+        Some(days).filter(|days| *days < DAYS_MAX)
     };
     let [latest, earliest] = interval.unwrap_or([per_day; 2]);
     Drift {

@@ -9,6 +9,8 @@ use hallstage_input::log::layout::Dimension;
 use hallstage_input::stage::CertificateTable;
 use std::str::FromStr;
 
+/// Standard uncertainties of an error that cover 95 % of its magnitudes.
+const COVERED: f64 = 1.96;
 /// The kinds of units of X, Y, Rz.
 const KINDS: [Dimension; 3] = [Dimension::Length, Dimension::Length, Dimension::Angle];
 
@@ -50,7 +52,7 @@ impl FromStr for ErrorLimits {
 
 impl ErrorLimits {
     /// These, else the limits of the certificate. A guarded limit is less by the amount that the rms error may be
-    /// larger than predicted: by the log, and by the declared inputs of the budget.
+    /// larger than predicted with 95 %: by the log, and by the declared inputs of the budget.
     #[must_use]
     pub fn or(
         self,
@@ -60,8 +62,11 @@ impl ErrorLimits {
     ) -> Self {
         let declared = budget.map_or([0.0; 3], Budget::declared);
         let guarded = predicted.filter(|_| table.is_guarded);
-        let guard =
-            |k: usize| guarded.map_or(0.0, |of| of.range[k][1].hypot(declared[k]) - of.rms[k]);
+        let guard = |k: usize| {
+            guarded.map_or(0.0, |of| {
+                of.range[k][1].hypot(COVERED * declared[k]) - of.rms[k]
+            })
+        };
         let guards = [0, 1, 2].map(guard);
         let limit = |k: usize| self.accepted[k].or(table.limits[k]);
         Self {

@@ -33,6 +33,7 @@ pub(super) struct DiffArgs {
 pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     let paths = [args.a.as_path(), args.b.as_path()];
     super::check_outputs([args.json.path.as_deref()], None, paths)?;
+    args.json.check_own()?;
     let [a, b] = [blob_file::read(paths[0])?, blob_file::read(paths[1])?];
     let errors = [standard_errors(&a, paths[0]), standard_errors(&b, paths[1])];
     let difference = pose_difference(&a, &b);

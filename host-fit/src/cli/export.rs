@@ -5,7 +5,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::output::export::{ExportError, ExportFormat, SLOTS, address_of, export};
-use crate::output::write_atomically;
+use crate::output::{kept, write_atomically};
 use clap::Args;
 use runtime::blob::MAX_BYTES;
 use std::path::PathBuf;
@@ -65,6 +65,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
     let name = format!("{stem}-{address:08x}.{}", args.format.extension());
     let out = (args.out.clone()).unwrap_or_else(|| args.params.with_file_name(name));
     super::check_outputs([Some(out.as_path())], None, [args.params.as_path()])?;
+    kept::check_own(&out, kept::IMAGE)?;
     write_atomically(&out, &file)?;
     let places: Vec<_> = addresses.iter().map(|at| format!("{at:#010x}")).collect();
     terminal::print(&format!(

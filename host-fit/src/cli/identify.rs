@@ -25,6 +25,7 @@ pub(super) struct IdentifyArgs {
 /// Asks a controller for its identity and its parameters.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], None, [])?;
+    args.json.check_own()?;
     let identity = talk_to(&args.can, interrupt::watch(), "asking", |talk, _| {
         on::identify(talk)
     })?;

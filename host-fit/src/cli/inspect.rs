@@ -32,6 +32,7 @@ pub(super) struct InspectArgs {
 /// Shows every field of a blob, and the faults that its calibration is without where its posterior tells.
 pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], None, [args.params.as_path()])?;
+    args.json.check_own()?;
     let set = blob_file::read(&args.params)?;
     let known = posterior_file::read(&set, &args.params).ok().flatten();
     let errors = known

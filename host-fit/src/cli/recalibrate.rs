@@ -7,7 +7,7 @@ use crate::calibrate::{EvalOrder, Updated};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::posterior_file::PosteriorFileError;
-use crate::output::{Outputs, blob_file, posterior_file};
+use crate::output::{Outputs, blob_file, kept, posterior_file};
 use crate::report::page::CERTIFICATE;
 use crate::report::text::as_text;
 use crate::report::verdict::{End, Subject};
@@ -58,7 +58,9 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         Some(&args.report),
         inputs.chain(old_posterior.as_deref()),
     )?;
+    args.json.check_own()?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
+    kept::check_own_blob(&args.out, &old.serial)?;
     if old.model != ModelKind::Field {
         let model = Model::from_kind(old.model).title();
         return Err(RecalibrateError::OtherModel { model }.into());

@@ -28,10 +28,14 @@ pub enum OutputProblem {
     #[error("also another output of this command; name another file")]
     IsOutput,
     /// The command did not write the file that is there.
-    #[error("is there and may hold a measurement; name another file, or replace it with --force")]
+    #[error(
+        "is there and may hold a measurement; name another file, or move it away (fit, plan, simulate and decode replace it with --force)"
+    )]
     NotOwn,
     /// A blob of another stage.
-    #[error("is the blob of stage {0}; name another file, or replace it with --force")]
+    #[error(
+        "is the blob of stage {0}; name another file, or move it away (fit replaces it with --force)"
+    )]
     OtherSerial(String),
     /// The system does not write it.
     #[error("{}", in_words(.0))]

@@ -12,6 +12,8 @@ pub const BLOB: &[&[u8]] = &[b"HALL"];
 /// See [`BLOB`].
 pub const JSON: &[&[u8]] = &[b"{"];
 /// See [`BLOB`].
+pub const IMAGE: &[&[u8]] = &[b":", b"HALL"];
+/// See [`BLOB`].
 pub const POSES: &[&[u8]] = &[b"movement,t_us,x_um,y_um,", b"\x93NUMPY"];
 /// See [`BLOB`].
 pub const PLAN: &[&[u8]] = &[b"t_us,x_um,y_um,"];

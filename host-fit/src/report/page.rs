@@ -229,7 +229,7 @@ impl Source<'_> {
         let limits = by_axis(&|k| {
             let [accepted, guard] = [limits[k]?, guards[k]].map(|si| si * 1e6);
             Some(match is_guarded {
-                true => format!("{:.2} - {guard:.2} = {accepted:.2}", accepted + guard),
+                true => format!("{:.3} - {guard:.3} = {accepted:.3}", accepted + guard),
                 false => format!("{accepted:.2}"),
             })
         });
@@ -247,7 +247,7 @@ impl Source<'_> {
             ),
             (limits, true) => format!(
                 "guarded acceptance (JCGM 106): rms errors in service at most at the limit less a guard band: {limits}; and at most \
-                 {of_noise}. The guard band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs"
+                 {of_noise}. The guard band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs (1.96 standard uncertainties)"
             ),
         }
     }

@@ -235,7 +235,7 @@ fn the_decision_rule_has_limit_guard_band_and_what_is_accepted() {
         ..subject(End::Written, &diagnosis)
     };
     let page = source(&stage, &dataset, guarded).html().expect("a page");
-    for part in ["X 1.50 - 0.25 = 1.25 µm", "Rz 1.30 µrad"] {
+    for part in ["X 1.500 - 0.250 = 1.250 µm", "Rz 1.30 µrad"] {
         assert!(page.contains(part), "{part}");
     }
 }

@@ -45,6 +45,9 @@ pub fn answer(trend: &Trend) -> String {
         None => "a line through two calibrations has no interval".to_owned(),
     };
     let (name, unit) = (axis.name, sign(axis.micro));
+    if drift.days[0] == Some(0.0) {
+        return format!("Errors of {name} in service are beyond their limit of {limit:.2} {unit}.");
+    }
     format!(
         "Errors of {name} in service reach their limit of {limit:.2} {unit} on {date}; {interval}."
     )

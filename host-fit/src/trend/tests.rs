@@ -54,6 +54,9 @@ fn an_even_drift_reaches_the_limit_on_its_day() {
     let last = found.calibrations.last().expect("four");
     assert_eq!(last.day, 90.0);
     assert!((f64::from((date - last.date.date()).get_days()) - day).abs() <= 1.0);
+    // Errors beyond the limit need no drift.
+    let beyond = super::drift([0.0; 2], 2, 1e-6, Some(0.9e-6));
+    assert_eq!(beyond.days, [Some(0.0); 3]);
     // No limit, no date.
     assert_eq!(found.drifts[1].days, [None; 3]);
 }

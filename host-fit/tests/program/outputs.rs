@@ -31,6 +31,16 @@ fn what_the_command_did_not_write_is_replaced_only_by_force() {
     kept("decode old.bin log.csv --out old.csv");
     kept("fit log.csv --out old.bin --serial B --model 31");
     kept("fit log.csv --out old.bin --model 31");
+    for command in [
+        "check log.csv",
+        "eval old.bin log.csv",
+        "inspect old.bin",
+        "diff old.bin old.bin",
+        "recalibrate old.bin log.csv --what gain --out new.bin",
+    ] {
+        kept(&format!("{command} --json old.csv"));
+    }
+    kept("export old.bin --out old.csv");
     assert_eq!(bench.text("old.csv"), log());
     // Its own files, and by force.
     bench.good("fit log.csv --out old.bin --serial A --model 31");
