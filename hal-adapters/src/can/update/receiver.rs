@@ -9,7 +9,7 @@ use crate::can::command::{Answer, Command, Outcome, Request};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
-/// A transfer without a frame for this time is closed, and a nonce without its tag expires, s.
+/// A transfer without a frame for this time is closed, and a nonce of a host that is silent expires, s.
 const IDLE_S: u32 = 5;
 
 /// An open transfer.
@@ -39,7 +39,7 @@ pub struct Receiver<'s> {
     idle_ticks_max: u32,
     staging: Staging,
     transfer: Option<Transfer>,
-    /// The nonce of the next tag: asked for and not used yet, and its age.
+    /// The nonce of the next tag: asked for and not used yet, and the time since the host was last heard of it.
     nonce: Option<Nonce>,
     nonce_ticks: u32,
     /// The last command with a right tag, and its answer, until the next challenge.
@@ -98,6 +98,7 @@ impl<'s> Receiver<'s> {
             return refused;
         };
         if let Some(index) = self.staging.missing(0, true) {
+            self.nonce_ticks = 0;
             return Err((Outcome::Incomplete, index.into()));
         }
         self.nonce = None;
@@ -126,6 +127,7 @@ impl<'s> Receiver<'s> {
             transfer.idle_ticks = 0;
             transfer.bytes
         });
+        self.nonce_ticks = 0;
         self.staging.put(data.index, data.word, bytes);
     }
 
@@ -223,9 +225,10 @@ impl<'s> Receiver<'s> {
 
     fn challenge(&mut self, part: u8, nonce: Option<Nonce>) -> (Outcome, u32) {
         if part == 0 {
-            (self.nonce, self.nonce_ticks, self.answered) = (nonce, 0, None);
+            (self.nonce, self.answered) = (nonce, None);
             self.staging.clear_tag();
         }
+        self.nonce_ticks = 0;
         let drawn = self.nonce.as_ref();
         match (drawn.and_then(|words| words.get(usize::from(part))), part) {
             (Some(word), _) => (Outcome::Done, *word),
