@@ -14,7 +14,7 @@
 //! | [`scope`] | sensors as traces in a terminal |
 //! | [`trend`] | how the calibrations of a stage change |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, recorded, updated |
-//! | [`join`](mod@join) | records of the sensors and of the reference with their clocks, made into a log |
+//! | [`join`] | records of the sensors and of the reference with their clocks, made into a log |
 //! | [`cli`] | the commands |
 #![forbid(unsafe_code)]
 

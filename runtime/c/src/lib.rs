@@ -15,7 +15,7 @@ use core::mem::MaybeUninit;
 use runtime::tracker::Health;
 use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{
-    AnyDecoder, BlobError, MotionCorrection, OnInvalid, ParameterSet, CommandedMotion, PoseTracker,
+    AnyDecoder, BlobError, CommandedMotion, MotionCorrection, OnInvalid, ParameterSet, PoseTracker,
     Predictor, RawFrame, Reading,
 };
 pub use storage::{HallDecoder, HallPredictor, HallServo};

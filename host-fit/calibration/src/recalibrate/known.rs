@@ -11,7 +11,7 @@ use runtime::ParameterSet;
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredPosterior {
-    /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`].
+    /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`](hallstage_solver::estimator::posterior::Posterior::covariance).
     pub covariance: DMatrix<f64>,
     /// The noise of the log.
     pub noise: Noise,

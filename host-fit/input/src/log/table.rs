@@ -84,7 +84,7 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Opens a table, and reads what stands above its rows: see [`Preamble`].
+    /// Opens a table, and reads what stands above its rows: see `preamble.rs`.
     ///
     /// Lines end in LF, CRLF or CR, a line that starts with `#` is a comment, blank lines are skipped. Numbers may
     /// have decimal commas where commas do not separate cells. A row may have more cells than names, if they are
@@ -92,7 +92,7 @@ impl<'a> Table<'a> {
     /// of the text.
     ///
     /// # Errors
-    /// Errors of reading and of [`Preamble::read`], `LineTooLong`.
+    /// Errors of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `OtherFormat`, `LineTooLong`.
     pub fn open(text: TextReader<'a>, is_known: impl Fn(&str) -> bool) -> Result<Self, LogError> {
         let path = text.path().to_path_buf();
         let mut lines = Lines::new(text);

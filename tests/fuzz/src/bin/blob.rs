@@ -6,7 +6,7 @@
 use crc::{CRC_32_ISCSI, Crc};
 use libfuzzer_sys::fuzz_target;
 use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAX_BYTES};
-use runtime::{Decode, ParameterSet, CommandedMotion, PlanarPose, RawFrame};
+use runtime::{CommandedMotion, Decode, ParameterSet, PlanarPose, RawFrame};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
