@@ -14,22 +14,19 @@ use crate::statistics::Statistics;
 use crate::work;
 use host_fit::calibrate::{JudgedFit, Updated, other_scales};
 use host_fit::calibration::diagnose::refusal::Refusal;
-use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::calibration::words;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
-use host_fit::report::budget;
 use host_fit::report::errors::{errors, from_rms_and_peak};
 use host_fit::report::page::CERTIFICATE;
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::model::Model;
 use host_fit::solver::estimator::update::Change;
 use numpy::PyArray2;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 use runtime::ParameterSet;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -73,15 +70,6 @@ impl Calibration {
 
     pub const fn set(&self) -> &ParameterSet {
         &self.set
-    }
-
-    fn fit_or_raise(&self, what: &str) -> PyResult<(&OfFit, &Fit)> {
-        let problem = || {
-            PyValueError::new_err(format!(
-                "{what}: only a calibration that `fit` has made has its log; use evaluate(log)"
-            ))
-        };
-        self.origin.fit().ok_or_else(problem)
     }
 
     /// What is known of the parameters.
@@ -231,31 +219,23 @@ impl Calibration {
     /// under the noise of the log; of others the sandwich over movements.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.known().matrix(py, |matrix, i, j| matrix[(i, j)])
+        self.known().covariance_array(py)
     }
 
     /// The same as a `pandas.DataFrame` with the names of its rows and columns.
     fn covariance_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let names = self.names()?;
-        let options = [("index", &names), ("columns", &names)].into_py_dict(py)?;
-        let pandas = py.import("pandas")?;
-        pandas.call_method("DataFrame", (self.covariance(py)?,), Some(&options))
+        self.known().covariance_frame(py)
     }
 
     /// The parameters as a `pandas.DataFrame`, a row for each by name: `value`, `std`, `unit`.
     fn to_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let rows = self.parameters(py)?.values();
-        let frame = py.import("pandas")?.call_method1("DataFrame", (rows,))?;
-        frame.call_method1("set_index", ("name",))
+        self.known().parameter_frame(py)
     }
 
     /// Correlations of the same parameters, from -1 to 1.
     #[getter]
     fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.known().matrix(py, |matrix, i, j| match i == j {
-            true => 1.0,
-            false => matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt(),
-        })
+        self.known().correlations(py)
     }
 
     /// The uncertainty budget as a `pandas.DataFrame`, a row for each source: `u` in `unit`, contributions over service
@@ -263,27 +243,18 @@ impl Calibration {
     /// `combined`, and the inputs that are not included. None without a budget. Needs pandas.
     #[getter]
     fn budget<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let budget = self.known.as_ref().and_then(|known| known.budget.as_ref());
-        let frame = |budget| {
-            let rows = finding::figures(py, &budget::frame(budget))?;
-            let options = [("sep", "_")].into_py_dict(py)?;
-            py.import("pandas")?
-                .call_method("json_normalize", (rows,), Some(&options))
-        };
-        budget.map(frame).transpose()
+        self.known().budget_frame(py)
     }
 
     /// rms and peak of X, Y, Rz, a dict, um, um, urad: over all rows of the log, zero deviations refitted where
     /// the model has them.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let [rms, peak] = [self.set.fit.rms, self.set.fit.peak].map(|of| of.map(f64::from));
-        match &self.origin {
-            Origin::Fit(of) if let Ok(fit) = &of.outcome.fitted => {
-                finding::figures(py, &errors(&fit.judgement.errors))
-            }
-            _ => finding::figures(py, &from_rms_and_peak(rms, peak)),
+        if let Some((_, fit)) = self.origin.fit() {
+            return finding::figures(py, &errors(&fit.judgement.errors));
         }
+        let [rms, peak] = [self.set.fit.rms, self.set.fit.peak].map(|of| of.map(f64::from));
+        finding::figures(py, &from_rms_and_peak(rms, peak))
     }
 
     /// Errors of the rows of the log that was fitted (of a long one, of the sample), zero deviations taken off,
@@ -291,7 +262,7 @@ impl Calibration {
     ///
     /// Raises `ValueError` of a calibration that `fit` has not made.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (of, fit) = self.fit_or_raise("residuals")?;
+        let (of, fit) = self.origin.fit_or_raise("residuals")?;
         let dataset = fit.rows(&of.log.dataset);
         let errors = fit.errors_by_row(dataset);
         residuals(
@@ -382,7 +353,7 @@ impl Calibration {
         operator: Option<&str>,
         notes: Option<BTreeMap<String, String>>,
     ) -> PyResult<()> {
-        let (of, fit) = self.fit_or_raise("report")?;
+        let (of, fit) = self.origin.fit_or_raise("report")?;
         let about = About {
             title: CERTIFICATE,
             serial: &self.set.serial,

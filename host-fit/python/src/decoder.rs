@@ -1,9 +1,9 @@
 //! Poses from codes, by the code that runs on the target.
 
-use crate::arrays::{codes, reals, same_rows, slice};
 use crate::error::{blob_error, log_error, posterior_error, wrong};
 use crate::log::Log;
 use crate::motion::Commanded;
+use crate::rows::Given;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::{LogReading, ReadOptions};
@@ -15,7 +15,6 @@ use host_fit::solver::estimator::posterior::Posterior;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use runtime::frame::MISSING_CODE;
 use runtime::{
     AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading, Status,
 };
@@ -114,32 +113,26 @@ impl Decoder {
             ticks => OnInvalid::Hold { ticks },
         };
         let commanded = Commanded::new(self.set.motion_correction, velocity, acceleration)?;
-        let (hall, caps) = match Given::new(log, hall, caps, mount, body)? {
+        let given = match Given::new(log, hall, caps, [mount, body])? {
             Given::Log(log) => {
                 let words = self.statuses(py, log, on_invalid)?;
                 return records(py, words, ("log", commanded), is_nan);
             }
-            Given::Codes(hall, caps) => (hall, caps),
+            Given::Codes(given) => given,
         };
-        let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
-        let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
-        let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
-        same_rows("caps", caps.len(), "hall", hall.len())?;
-        let temperature = temperatures(hall.len(), mount, body)?;
-        let mut words = Vec::with_capacity(hall.len() * WORDS);
+        let rows = given.rows()?;
+        let mut words = Vec::with_capacity(rows.len() * WORDS);
         let mut tracker = PoseTracker::new(self.decoder, on_invalid);
-        for start in (0..hall.len()).step_by(ROWS_AT_ONCE) {
-            let end = hall.len().min(start + ROWS_AT_ONCE);
-            let rows = Rows {
-                hall: &hall[start..end],
-                caps: &caps[start..end],
-                temperature: temperature.as_ref().map(|all| &all[start..end]),
-                first: start,
-            };
+        for start in (0..rows.len()).step_by(ROWS_AT_ONCE) {
+            let frames = rows.frames(start..rows.len().min(start + ROWS_AT_ONCE));
             py.detach(|| match (&self.decoder, on_invalid) {
-                (AnyDecoder::Linear(decoder), OnInvalid::Zero) => rows.decode(decoder, &mut words),
-                (AnyDecoder::Field(decoder), OnInvalid::Zero) => rows.decode(decoder, &mut words),
-                _ => rows.track(&mut tracker, &mut words),
+                (AnyDecoder::Linear(decoder), OnInvalid::Zero) => {
+                    decode(decoder, frames, &mut words);
+                }
+                (AnyDecoder::Field(decoder), OnInvalid::Zero) => {
+                    decode(decoder, frames, &mut words);
+                }
+                _ => frames.for_each(|frame| words.extend(words_of(&tracker.tick(&frame)))),
             });
             py.check_signals()?;
         }
@@ -178,35 +171,24 @@ impl Decoder {
             let all = known.at(&reading);
             [0, 1, 2].map(|k| all[if whole { 3 + k } else { k }])
         };
-        let given = match Given::new(log, hall, caps, mount, body)? {
+        let decoder = &self.decoder;
+        let found: Vec<[f64; 3]> = match Given::new(log, hall, caps, [mount, body])? {
             Given::Log(log) => {
-                let decoder = &self.decoder;
                 let found = work::run(py, || {
                     let mut readings = Vec::new();
                     let read = log.read_for(ReadOptions::DECODE, |_, row| {
                         readings.push(row.row.frame.decode(decoder, &PlanarPose::ZERO));
                     });
-                    read.map(|_: LogReading| readings.into_par_iter().map(at).collect::<Vec<_>>())
+                    read.map(|_: LogReading| readings.into_par_iter().map(at).collect())
                 })?;
-                let found = found.map_err(|error| log_error(py, &error))?;
-                return crate::log::rows_of_three(py, found);
+                found.map_err(|error| log_error(py, &error))?
             }
-            Given::Codes(hall, caps) => (hall, caps),
+            Given::Codes(given) => {
+                let rows = given.rows()?;
+                let of_row = |row| at(decoder.decode(&rows.frame(row), &PlanarPose::ZERO));
+                work::run(py, || (0..rows.len()).into_par_iter().map(of_row).collect())?
+            }
         };
-        let (hall, caps) = (codes("hall", given.0)?, codes("caps", given.1)?);
-        let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
-        let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
-        same_rows("caps", caps.len(), "hall", hall.len())?;
-        let temperature = temperatures(hall.len(), mount, body)?;
-        let rows = Rows {
-            hall,
-            caps,
-            temperature: temperature.as_deref(),
-            first: 0,
-        };
-        let of_row = |row: usize| at(self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO));
-        let found: Vec<[f64; 3]> =
-            work::run(py, || (0..hall.len()).into_par_iter().map(of_row).collect())?;
         crate::log::rows_of_three(py, found)
     }
 
@@ -233,32 +215,6 @@ impl Decoder {
         match serial.as_str() {
             "" => format!("<Decoder, {model}>"),
             serial => format!("<Decoder of {serial}, {model}>"),
-        }
-    }
-}
-
-/// The rows to decode.
-enum Given<'a, 'py> {
-    Log(&'a Log),
-    Codes(&'a Bound<'py, PyAny>, &'a Bound<'py, PyAny>),
-}
-
-impl<'a, 'py> Given<'a, 'py> {
-    fn new(
-        log: Option<&'a Bound<'py, Log>>,
-        hall: Option<&'a Bound<'py, PyAny>>,
-        caps: Option<&'a Bound<'py, PyAny>>,
-        mount: Option<&Bound<'py, PyAny>>,
-        body: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Self> {
-        match (log, hall, caps) {
-            (Some(log), None, None) if mount.is_none() && body.is_none() => {
-                Ok(Self::Log(log.get()))
-            }
-            (None, Some(hall), Some(caps)) => Ok(Self::Codes(hall, caps)),
-            (Some(_), ..) => Err(wrong("log", "a log has its codes and temperatures itself")),
-            (None, None, _) => Err(wrong("hall", "is missing")),
-            (None, _, None) => Err(wrong("caps", "is missing")),
         }
     }
 }
@@ -313,40 +269,10 @@ pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<StoredPosterior>)> {
     Ok((set, known))
 }
 
-/// Codes by row of this piece.
-struct Rows<'a> {
-    hall: &'a [[i32; 3]],
-    caps: &'a [[i32; 3]],
-    temperature: Option<&'a [[i32; 2]]>,
-    /// Number of the first row.
-    first: usize,
-}
-
-impl Rows<'_> {
-    #[inline(always)]
-    fn frame(&self, row: usize) -> RawFrame {
-        let sequence = (self.first + row) as u32;
-        let frame = RawFrame::new(self.hall[row], self.caps[row], sequence, 0);
-        match self.temperature {
-            Some(all) => frame.with_temperature_mc(all[row]),
-            None => frame,
-        }
-    }
-
-    /// Adds the words of all rows, invalid fields 0.
-    fn decode(&self, decoder: &impl Decode, words: &mut Vec<u32>) {
-        for row in 0..self.hall.len() {
-            words.extend(words_of(
-                &decoder.decode(&self.frame(row), &PlanarPose::ZERO),
-            ));
-        }
-    }
-
-    /// The same with what is invalid held.
-    fn track(&self, tracker: &mut PoseTracker, words: &mut Vec<u32>) {
-        for row in 0..self.hall.len() {
-            words.extend(words_of(&tracker.tick(&self.frame(row))));
-        }
+/// Adds the words of all frames, invalid fields 0.
+fn decode(decoder: &impl Decode, frames: impl Iterator<Item = RawFrame>, words: &mut Vec<u32>) {
+    for frame in frames {
+        words.extend(words_of(&decoder.decode(&frame, &PlanarPose::ZERO)));
     }
 }
 
@@ -355,35 +281,6 @@ fn words_of(reading: &Reading) -> [u32; WORDS] {
     let [x, y, rz] = reading.pose.planar.to_array().map(f32::to_bits);
     let [z, rx, ry] = reading.pose.vertical.to_array().map(f32::to_bits);
     [x, y, rz, z, rx, ry, reading.status.bits()]
-}
-
-/// Temperatures as codes, m degC; `None` where none are given.
-fn temperatures(
-    rows: usize,
-    mount: Option<&Bound<'_, PyAny>>,
-    body: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Option<Vec<[i32; 2]>>> {
-    if mount.is_none() && body.is_none() {
-        return Ok(None);
-    }
-    let mut all = vec![[MISSING_CODE; 2]; rows];
-    for (sensor, (argument, given)) in [("mount", mount), ("body", body)].into_iter().enumerate() {
-        let Some(given) = given else { continue };
-        let celsius = reals(argument, given)?;
-        let celsius = slice(celsius.as_slice())?;
-        same_rows(argument, celsius.len(), "hall", rows)?;
-        for (row, (code, celsius)) in all.iter_mut().zip(celsius).enumerate() {
-            match celsius.abs() {
-                ..=1e6 => code[sensor] = (celsius * 1e3).round() as i32,
-                _ if celsius.is_nan() => {}
-                _ => {
-                    let problem = format!("row {row}: {celsius} degC is no temperature");
-                    return Err(wrong(argument, problem));
-                }
-            }
-        }
-    }
-    Ok(Some(all))
 }
 
 /// Writes NaN in place of a pose that is invalid and not held.

@@ -18,6 +18,7 @@ mod origin;
 mod plan;
 mod program;
 mod report;
+mod rows;
 mod stage;
 mod statistics;
 mod work;

@@ -6,6 +6,8 @@ use host_fit::calibration::fit::Fit;
 use host_fit::input::log::LogReading;
 use host_fit::report::result::Report;
 use host_fit::report::verdict::Subject;
+use pyo3::PyResult;
+use pyo3::exceptions::PyValueError;
 use std::sync::Arc;
 
 /// The origin of a calibration.
@@ -28,6 +30,16 @@ impl Origin {
             Self::Fit(of) => Some((of, of.outcome.fitted.as_ref().ok()?)),
             _ => None,
         }
+    }
+
+    /// The same, or an exception that names the caller.
+    pub fn fit_or_raise(&self, what: &str) -> PyResult<(&OfFit, &Fit)> {
+        let problem = || {
+            PyValueError::new_err(format!(
+                "{what}: only a calibration that `fit` has made has its log; use evaluate(log)"
+            ))
+        };
+        self.fit().ok_or_else(problem)
     }
 
     pub fn diagnosis(&self) -> Option<&Diagnosis> {

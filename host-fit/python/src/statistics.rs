@@ -1,8 +1,10 @@
 //! What is known of the parameters of a calibration: values, standard errors, covariance.
 
+use crate::finding;
 use host_fit::calibration::fit::Fit;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::diff::{parameter_changes, pose_difference};
+use host_fit::report::budget;
 use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
 use host_fit::report::result::Report;
 use host_fit::solver::estimator::terms;
@@ -10,7 +12,7 @@ use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use runtime::ParameterSet;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -64,8 +66,30 @@ impl Statistics<'_> {
             .ok_or_else(|| PyValueError::new_err(problem))
     }
 
-    /// A function of the covariance and two of its rows, as a matrix.
-    pub fn matrix<'py>(
+    /// The covariance as an array.
+    pub fn covariance_array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.matrix(py, |matrix, i, j| matrix[(i, j)])
+    }
+
+    /// The covariance as a `pandas.DataFrame`.
+    pub fn covariance_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let names = self.names()?;
+        let options = [("index", &names), ("columns", &names)].into_py_dict(py)?;
+        let covariance = self.covariance_array(py)?;
+        let pandas = py.import("pandas")?;
+        pandas.call_method("DataFrame", (covariance,), Some(&options))
+    }
+
+    /// The correlations as an array.
+    pub fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.matrix(py, |matrix, i, j| match i == j {
+            true => 1.0,
+            false => matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt(),
+        })
+    }
+
+    /// A function of the covariance and two of its rows, as an array.
+    fn matrix<'py>(
         &self,
         py: Python<'py>,
         of: impl Fn(&DMatrix<f64>, usize, usize) -> f64,
@@ -76,6 +100,25 @@ impl Statistics<'_> {
         let number = |(i, j): (usize, usize)| of(&matrix, i.max(j), i.min(j));
         let numbers = (0..n * n).map(|k| number((k / n, k % n)));
         PyArray1::from_iter(py, numbers).reshape([n, n])
+    }
+
+    /// The parameters as a `pandas.DataFrame`.
+    pub fn parameter_frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.parameters(py)?.values();
+        let frame = py.import("pandas")?.call_method1("DataFrame", (rows,))?;
+        frame.call_method1("set_index", ("name",))
+    }
+
+    /// The budget as a `pandas.DataFrame`.
+    pub fn budget_frame<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let frame = |budget| {
+            let rows = finding::figures(py, &budget::frame(budget))?;
+            let options = [("sep", "_")].into_py_dict(py)?;
+            py.import("pandas")?
+                .call_method("json_normalize", (rows,), Some(&options))
+        };
+        let budget = self.known.and_then(|known| known.budget.as_ref());
+        budget.map(frame).transpose()
     }
 
     /// The parameters as a dict of `hallstage.Parameter`, in the order of the covariance; parameters without one follow.
