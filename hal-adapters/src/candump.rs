@@ -132,7 +132,7 @@ fn parse_id(text: &str) -> Option<Result<Id, LineError>> {
     }
 }
 
-/// The frame of a line of the screen, of which identifier and rest are given.
+/// The frame of a line of the screen, from its identifier and the rest of the line.
 fn parse_screen<'l>(
     id: &str,
     mut rest: impl Iterator<Item = &'l str>,

@@ -160,7 +160,7 @@ impl Trend {
         })
     }
 
-    /// The date so many days after the last calibration.
+    /// The date a number of days after the last calibration.
     pub fn date_after(&self, days: f64) -> Option<Date> {
         let time = SignedDuration::from_secs((days * DAY_S) as i64);
         Some(

@@ -168,7 +168,7 @@ impl<'a> TextReader<'a> {
         &self.path
     }
 
-    /// The first bytes of the text, by which its format is known, without white space before them.
+    /// The first bytes of the text, without white space before them: they show its format.
     pub fn opening(&self) -> &[u8] {
         &self.opening
     }

@@ -38,7 +38,7 @@ const ROWS_AT_ONCE: usize = 1 << 18;
 
 /// Decodes as the controller does, bit for bit: equations (31) to (33) of the paper, or the field model.
 ///
-/// `Decoder.open("params.bin")` reads a parameter blob; `Calibration.decoder()` gives that of a fit.
+/// `Decoder.open("params.bin")` reads a parameter blob; `Calibration.decoder()` gives the decoder of a fit.
 #[pyclass(frozen, module = "hallstage")]
 pub struct Decoder {
     set: ParameterSet,

@@ -55,7 +55,7 @@ fn a_slow_reference_is_joined_as_long_as_its_samples_show_the_motion() {
     join.run();
     join.check_poses(30e-9);
     every(60).refused(|error| matches!(error, JoinError::ReferenceTooSlow { .. }));
-    // Values that are held are told from a slow clock.
+    // Held values are no slow clock.
     let mut last = "";
     let held = rows.lines().enumerate().map(|(k, row)| {
         let cells: Vec<&str> = row.splitn(3, ',').collect();

@@ -1,6 +1,7 @@
 //! What may be wrong before a clock is blamed: units, signs and the order of columns.
 
-use super::{EXPLAINED_MIN, Records, SEARCH_PERIODS, SEARCH_TICKS};
+use super::search::{SEARCH_PERIODS, SEARCH_TICKS};
+use super::{EXPLAINED_MIN, Records};
 use crate::join::JoinError;
 use crate::join::node_clock::Tick;
 use crate::join::offset::Clocks;

@@ -26,6 +26,8 @@ mod slow;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod time_tests;
+#[cfg(test)]
 mod unexplained_tests;
 
 use super::limits::ROUNDS;

@@ -193,7 +193,7 @@ impl<'a> Scan<'a> {
         let apart = (self.steps.len().isqrt() / 2).max(1);
         // A moment at the end of a log does not show the state in which the stage ends.
         let end = |range: &Range<usize>| match self.steps.len() {
-            last if range.end == last => last - apart,
+            last if range.end == last => last.saturating_sub(apart),
             _ => range.end,
         };
         let coarse = ranges.iter().filter_map(|range| {
