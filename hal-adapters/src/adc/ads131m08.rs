@@ -36,7 +36,7 @@
 //! 45 us wait for the end of a conversion first, for one frame at most.
 //!
 //! By the model of the part, in all eight behaviours where the sheet is silent: the largest error of the time of a sample,
-//! and the samples that are refused, with one interruption of this length in a ms (`cargo test -p bench driver`):
+//! and the samples that are refused, with one interruption of this length in a ms (`cargo test -p bench driver -- --nocapture`):
 //!
 //! | SPI, gap before each frame | never interrupted | 10 us | 30 us | 100 us |
 //! |---|---|---|---|---|
@@ -305,7 +305,8 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
         self.temperatures = Held::MISSING;
         self.turn = MODE_REGISTER;
         let result = self.try_start();
-        self.start_failed = result.is_err();
+        // A reset is no help where DRDY shows no conversion.
+        self.start_failed = !matches!(result, Ok(()) | Err(AdcError::UnknownInstant));
         result
     }
 

@@ -36,7 +36,7 @@
 //! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
 //! sample to sample it takes one frame, about 6 us; the part needs 2 us. The time of a sample is the middle of the frames
 //! of the Hall codes. If they take more than 20 us together, the sample is refused
-//! ([`AdcError::UnknownInstant`]): by an interruption, inputs that are not neighbours, or SPI below 7.5 MHz.
+//! ([`AdcError::UnknownInstant`]): by an interruption, inputs that are not neighbours, or SPI below 9.5 MHz.
 //!
 //! **Skew.** Channels are sampled one frame apart, about 6 us. Put the three Hall probes on
 //! neighbouring inputs: A and C are then 12 us apart, which at the fastest motion of a service

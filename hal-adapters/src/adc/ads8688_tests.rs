@@ -77,6 +77,22 @@ fn try_sample(expected: Frames) -> Result<RawFrame, AdcError<ErrorKind>> {
     on_part(&expected, |adc| adc.sample(7))
 }
 
+/// A clock that runs on by 5 us from look to look makes 25 us of the frames of the probes.
+#[test]
+fn hall_codes_that_take_too_long_have_no_instant() {
+    let slow = testing::on_part(
+        Ads8688::new,
+        Line::every(5),
+        &tick(0x01, 0x3f),
+        &[],
+        |adc| {
+            adc.reference = Reference::Settled;
+            adc.sample(7)
+        },
+    );
+    assert_eq!(slow, Err(AdcError::UnknownInstant));
+}
+
 /// Codes, and the register that is read back after them.
 fn tick(register: u8, value: u8) -> Frames {
     [sampled(ZERO), frame([register << 1, 0], [value, 0, 0])].concat()

@@ -35,7 +35,7 @@
 //! ([`page::NEXT_CRC`]). To go back, a host reads the blob back before the update, and sends it again.
 //!
 //! **Authority.** The tag ([`tag`]) is AES-CMAC over the nonce, the request with its token, and for a
-//! commit the blob. One nonce serves for one tag, right or wrong, and for 5 s: a recorded tag is worth nothing, and
+//! commit the blob. One nonce serves for one tag, right or wrong, until 5 s without a frame: a recorded tag is worth nothing, and
 //! each guess takes a challenge. All requests that move the pose, invalidate it or reset the node need a tag
 //! ([`Command::needs_authority`]). Without a key any host on the bus may send them while the line says that
 //! the servo is off: the check of a frame shows damage, not the sender.

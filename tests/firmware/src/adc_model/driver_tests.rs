@@ -217,6 +217,10 @@ fn worst(board: Board, seed: u64) -> (f64, f64) {
 fn every_sample_has_its_instant_to_10_us_or_is_refused() {
     for spi_mhz in [1.0, 4.0, 5.25, 10.0] {
         for gap_us in [1.0, 5.0, 20.0, 50.0] {
+            let keeps_up = match spi_mhz {
+                5.25 => gap_us <= 5.0,
+                _ => spi_mhz > 5.25 && gap_us <= 20.0,
+            };
             let row = [0.0, 10.0, 30.0, 100.0].map(|preempted_us| {
                 let board = Board {
                     spi_mhz,
@@ -225,6 +229,12 @@ fn every_sample_has_its_instant_to_10_us_or_is_refused() {
                     ..USUAL
                 };
                 let (worst, refused) = worst(board, 7);
+                match keeps_up {
+                    true if preempted_us == 0.0 => assert_eq!(refused, 0.0, "{board:?}"),
+                    true => assert!(refused < 20.0, "{refused} %: {board:?}"),
+                    false => assert_eq!(refused, 100.0, "{board:?}"),
+                }
+                assert!(worst < 6.5, "{worst} us: {board:?}");
                 format!("{worst:.1} us, {refused:.0} %")
             });
             println!("| {spi_mhz} MHz, {gap_us} us | {} |", row.join(" | "));
