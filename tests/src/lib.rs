@@ -10,14 +10,14 @@
 //! | [`random`] | random numbers that depend on a seed alone |
 //! | [`node`] | a node that takes new parameters over the bus |
 
-use firmware::store::{Flash, SLOT_BYTES};
 use hal_adapters::can::update::NotWritten;
+use stage_node::store::{Flash, SLOT_BYTES};
 use std::error::Error;
 use std::process::ExitCode;
 
 pub mod compare;
 pub mod fault;
-#[path = "../../runtime/firmware/tests/flash_model/mod.rs"]
+#[path = "../../hal-adapters/node/tests/flash_model/mod.rs"]
 pub mod flash_model;
 pub mod job;
 pub mod motion;

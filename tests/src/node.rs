@@ -4,16 +4,16 @@
 
 use crate::flash_model::FlashModel;
 use crate::random::Random;
-use firmware::node::{Facts, Node as Ticking, Parameters};
-use firmware::outbox::Outbox;
-use firmware::records::{Choice, Loaded, Records};
-use firmware::retained::{Retained, WORDS};
-use firmware::schedule::PERIOD_US;
-use firmware::start_up::{Before, Cause, PROVEN_TICKS};
-use firmware::store::Image;
 use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
 use runtime::RawFrame;
+use stage_node::node::{Facts, Node as Ticking, Parameters};
+use stage_node::outbox::Outbox;
+use stage_node::records::{Choice, Loaded, Records};
+use stage_node::retained::{Retained, WORDS};
+use stage_node::schedule::PERIOD_US;
+use stage_node::start_up::{Before, Cause, PROVEN_TICKS};
+use stage_node::store::Image;
 use std::ptr::NonNull;
 
 /// Frames that a tick takes from the bus at most.

@@ -8,11 +8,11 @@ use crate::board;
 use crate::random::Random;
 use crate::wait::Stopwatch;
 use embedded_can::{Frame, StandardId};
-use firmware::node::Node;
-use firmware::outbox::Outbox;
-use firmware::schedule::TICKS_PER_S;
 use hal_adapters::can::update::Store;
 use hal_adapters::can::{BusFrame, Coded, Message, NodeNumber};
+use stage_node::node::Node;
+use stage_node::outbox::Outbox;
+use stage_node::schedule::TICKS_PER_S;
 use stm32f4xx_hal::pac::CAN1;
 use stm32f4xx_hal::pac::can1::TX;
 

@@ -1,8 +1,8 @@
 //! The parameters in RAM against their check, a word a tick: a bit that flips is found within two passes, 0.6 s.
 
 use crc::Digest;
-use firmware::records::Loaded;
-use firmware::store::CRC;
+use stage_node::records::Loaded;
+use stage_node::store::CRC;
 
 const WORDS: usize = size_of::<Loaded>() / 4;
 

@@ -1,10 +1,10 @@
 //! A fault is noted in RAM that survives a reset, and the core is reset. The next start reports the fault, see
-//! [`firmware::retained`].
+//! [`stage_node::retained`].
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use cortex_m::peripheral::{MPU, SCB};
-use firmware::retained::{FaultKind, Retained, Step, WORDS};
+use stage_node::retained::{FaultKind, Retained, Step, WORDS};
 use stm32f4xx_hal::pac::RCC;
 
 /// The start-up code neither clears nor sets it.

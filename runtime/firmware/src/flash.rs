@@ -3,8 +3,8 @@
 
 use crate::supply::Supply;
 use cortex_m::asm;
-use firmware::store::{Flash, SLOT_BYTES, SLOTS};
 use hal_adapters::can::update::NotWritten;
+use stage_node::store::{Flash, SLOT_BYTES, SLOTS};
 use stm32f4xx_hal::pac::FLASH;
 
 const BYTES: usize = SLOTS * SLOT_BYTES as usize;
@@ -57,10 +57,10 @@ impl Sectors {
         }
         let registers = &self.registers;
         if registers.cr().read().lock().bit_is_set() {
-            // SAFETY: any word may be written; these two open FLASH_CR.
-            KEYS.into_iter().for_each(|key| {
+            for key in KEYS {
+                // SAFETY: any word may be written; these two open FLASH_CR.
                 registers.keyr().write(|w| unsafe { w.bits(key) });
-            });
+            }
         }
         // SAFETY: bits that are cleared by writing 1.
         registers.sr().write(|w| unsafe { w.bits(END | ERRORS) });

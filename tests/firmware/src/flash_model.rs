@@ -3,7 +3,7 @@
 //! lies in it.
 
 use ::tests::flash_model::{Cut, FlashModel as Sectors};
-use firmware::store::Flash;
+use stage_node::store::Flash;
 use std::collections::VecDeque;
 
 /// Start of sector 1.

@@ -6,9 +6,9 @@
 //! `KEY`: 32 hexadecimal digits. `params.bin` lies in its first slot as a probe flashes it; its flash is lost when it
 //! ends.
 
-use firmware::schedule::Schedule;
 use hal_adapters::can::{BusFrame, Message, NodeNumber};
 use hal_adapters::socketcan::SocketCan;
+use stage_node::schedule::Schedule;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::process::ExitCode;

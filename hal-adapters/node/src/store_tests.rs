@@ -20,9 +20,9 @@ pub(crate) const SERIAL: Option<&str> = Some("HS-0007");
 /// A blob of the stage, in turn of both layouts and of another length.
 pub(crate) fn blob(number: usize) -> Vec<u8> {
     let sample: &[u8] = if number % 3 == 2 {
-        include_bytes!("../../examples/field.bin")
+        include_bytes!("../../../runtime/examples/field.bin")
     } else {
-        include_bytes!("../../examples/stage.bin")
+        include_bytes!("../../../runtime/examples/stage.bin")
     };
     let mut set = ParameterSet::from_bytes(sample).expect("the example");
     set.created = Text::try_from(format!("{number}").as_str()).expect("short");

@@ -19,7 +19,7 @@
 //! | [`retained`] | the record that survives a reset: last fault, running parameters, zero deviation |
 //! | [`fpu`] | the rounding mode of the decoder |
 //!
-//! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
+//! A program for a chip is around it: `runtime/firmware` for the STM32F405.
 #![no_std]
 #![deny(unsafe_code)]
 
