@@ -88,11 +88,11 @@
 // Z, Rx, Ry are invalid.
 #define HALL_STATUS_VERTICAL_INVALID (1 << 14)
 
-// X, Y, Rz are the last valid ones, repeated.
-#define HALL_STATUS_PLANAR_HELD (1 << 15)
+// A temperature is missing or implausible: decoded as if at T0 of the calibration.
+#define HALL_STATUS_TEMPERATURE_MISSING (1 << 15)
 
-// Z, Rx, Ry are the last valid ones, repeated.
-#define HALL_STATUS_VERTICAL_HELD (1 << 16)
+// The parameters were written by `host-fit fit --force`: their log was refused.
+#define HALL_STATUS_FORCED (1 << 16)
 
 // One or more servo periods before this frame had no frame.
 #define HALL_STATUS_FRAMES_MISSED (1 << 17)
@@ -103,8 +103,11 @@
 // A zero deviation is subtracted from X, Y, Rz. No fault.
 #define HALL_STATUS_ZERO_SET (1 << 19)
 
-// A temperature is missing or implausible: decoded as if at T0 of the calibration.
-#define HALL_STATUS_TEMPERATURE_MISSING (1 << 20)
+// X, Y, Rz are the last valid ones, repeated.
+#define HALL_STATUS_PLANAR_HELD (1 << 20)
+
+// Z, Rx, Ry are the last valid ones, repeated.
+#define HALL_STATUS_VERTICAL_HELD (1 << 21)
 
 // In place of a code that could not be read. No converter gives it, and it lies below
 // every window of accepted codes, so a missing code is never decoded.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::parameters::Text;
 use crate::sample;
+use crate::{Decode, PlanarPose, RawFrame, Status};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -230,14 +231,20 @@ fn a_header_that_no_blob_has_is_refused_by_its_reason_even_with_a_right_check() 
 }
 
 #[test]
-fn a_forced_blob_says_so_and_is_else_the_same() {
+fn a_forced_blob_and_its_poses_say_so_and_are_else_the_same() {
+    let frame = RawFrame::new([1200, 900, 700], [300, -200, 100], 0, 0);
     for (golden, n) in goldens() {
         let sound = ParameterSet::from_bytes(&golden[..n]).expect("golden");
         let mut forced = sound.clone();
         forced.fit.forced = true;
         let mut buffer = [0; MAX_BYTES];
         let blob = forced.to_bytes(&mut buffer).expect("it fits");
-        assert_eq!(ParameterSet::from_bytes(blob), Ok(forced));
+        let read = ParameterSet::from_bytes(blob).expect("sound");
+        assert_eq!(read, forced);
+        let decode = |set: &ParameterSet| set.decoder().decode(&frame, &PlanarPose::ZERO);
+        let (plain, marked) = (decode(&sound), decode(&read));
+        assert_eq!(marked.status, plain.status | Status::FORCED);
+        assert!(marked.pose == plain.pose && !marked.status.is_good());
         assert_eq!((blob[6], golden[6]), (1, 0));
         assert_eq!(
             blob[HEADER_BYTES..n - CRC_BYTES],

@@ -105,6 +105,8 @@ impl<D: Decode + ?Sized> Decode for &D {
 pub struct Decoder<M: Model> {
     constants: DecoderConstants<f32>,
     probes: [M::Probe<f32>; 3],
+    /// The status of every reading: [`Status::FORCED`], or none.
+    status: Status,
 }
 
 /// The decoder of a parameter set, whatever its model. A tick takes the same branch each time.
@@ -231,7 +233,18 @@ impl<M: Model> Decoder<M> {
         } else {
             constants.sensitivity_min = f32::MAX;
         }
-        Self { constants, probes }
+        Self {
+            constants,
+            probes,
+            status: Status::GOOD,
+        }
+    }
+
+    /// Marks every reading by [`Status::FORCED`] if the parameters were written by `--force`.
+    #[must_use]
+    pub const fn with_forced(mut self, is_forced: bool) -> Self {
+        self.status = Status::FORCED.when(is_forced);
+        self
     }
 
     /// The coefficients of the probes A, B, C.
@@ -286,7 +299,8 @@ impl<M: Model> Decoder<M> {
             .with(Status::PLANAR_EXTRAPOLATED.when(beyond(size_q, range_q)))
             .with(Status::TEMPERATURE_MISSING.with_next(temperature_bad & 1))
             .with(Status::PLANAR_INVALID.when(!planar_valid))
-            .with(Status::VERTICAL_INVALID.when(!vertical_valid));
+            .with(Status::VERTICAL_INVALID.when(!vertical_valid))
+            .with(self.status);
         Reading {
             pose: Pose {
                 planar: PlanarPose::from_array(zero_unless(planar_valid, q)),

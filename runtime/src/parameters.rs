@@ -176,9 +176,14 @@ fn letter(probe: u8) -> char {
 impl ParameterSet {
     /// The decoder of this set, of its model.
     pub const fn decoder(&self) -> AnyDecoder {
+        let (constants, is_forced) = (self.constants, self.fit.forced);
         match self.probes {
-            Probes::Linear(probes) => AnyDecoder::Linear(Decoder::new(self.constants, probes)),
-            Probes::Field(probes) => AnyDecoder::Field(Decoder::new(self.constants, probes)),
+            Probes::Linear(probes) => {
+                AnyDecoder::Linear(Decoder::new(constants, probes).with_forced(is_forced))
+            }
+            Probes::Field(probes) => {
+                AnyDecoder::Field(Decoder::new(constants, probes).with_forced(is_forced))
+            }
         }
     }
 }

@@ -1,4 +1,5 @@
-//! What is wrong with a reading: a bit mask. All is good when no bit is set, or bit 19 alone.
+//! What is wrong with a reading: a bit mask. All is good when no bit is set, or bit 19 alone. The
+//! bits mean the same everywhere; a CAN bus has bits 0 to 19.
 //!
 //! | bit | value | meaning | effect |
 //! |---|---|---|---|
@@ -11,12 +12,13 @@
 //! | 12 | 4096 | planar pose outside the calibrated range | none: extrapolated |
 //! | 13 | 8192 | X, Y, Rz invalid in this period | they are 0, or held |
 //! | 14 | 16384 | Z, Rx, Ry invalid in this period | they are 0, or held |
-//! | 15 | 32768 | X, Y, Rz are the last valid ones, repeated | |
-//! | 16 | 65536 | Z, Rx, Ry are the last valid ones, repeated | |
+//! | 15 | 32768 | a temperature is missing or implausible | none: decoded as if at T0 |
+//! | 16 | 65536 | the parameters were written by `--force`: their log was refused | none: errors may be large |
 //! | 17 | 131072 | one or more servo periods before this frame had no frame | |
 //! | 18 | 262144 | the frame repeats an earlier sequence number: nothing new | all six invalid |
 //! | 19 | 524288 | a zero deviation is subtracted from X, Y, Rz | none: no fault |
-//! | 20 | 1048576 | a temperature is missing or implausible | none: decoded as if at T0 |
+//! | 20 | 1048576 | X, Y, Rz are the last valid ones, repeated | |
+//! | 21 | 2097152 | Z, Rx, Ry are the last valid ones, repeated | |
 //!
 //! Bits 11 and 12 mean something only while bits 14 and 13 are clear.
 
@@ -53,21 +55,23 @@ impl Status {
     pub const PLANAR_INVALID: Self = Self(1 << 13);
     /// Z, Rx, Ry are invalid.
     pub const VERTICAL_INVALID: Self = Self(1 << 14);
-    /// X, Y, Rz are repeated.
-    pub const PLANAR_HELD: Self = Self(1 << 15);
-    /// Z, Rx, Ry are repeated.
-    pub const VERTICAL_HELD: Self = Self(1 << 16);
+    /// A temperature is missing or implausible: the pose was decoded as if at T0.
+    pub const TEMPERATURE_MISSING: Self = Self(1 << 15);
+    /// The parameters were written by `--force`, of a log that was refused.
+    pub const FORCED: Self = Self(1 << 16);
     /// Frames are missing before this frame.
     pub const FRAMES_MISSED: Self = Self(1 << 17);
     /// The frame is not new.
     pub const FRAME_REPEATED: Self = Self(1 << 18);
     /// A zero deviation is subtracted from X, Y, Rz. No fault.
     pub const ZERO_SET: Self = Self(1 << 19);
-    /// A temperature is missing or implausible: the pose was decoded as if at T0.
-    pub const TEMPERATURE_MISSING: Self = Self(1 << 20);
+    /// X, Y, Rz are repeated.
+    pub const PLANAR_HELD: Self = Self(1 << 20);
+    /// Z, Rx, Ry are repeated.
+    pub const VERTICAL_HELD: Self = Self(1 << 21);
 
     /// Every bit with its name, lowest first, for reports.
-    pub const NAMES: [(Self, &'static str); 21] = [
+    pub const NAMES: [(Self, &'static str); 22] = [
         (Self(1), "Hall code A bad"),
         (Self(1 << 1), "Hall code B bad"),
         (Self(1 << 2), "Hall code C bad"),
@@ -89,15 +93,16 @@ impl Status {
         ),
         (Self::PLANAR_INVALID, "planar pose invalid"),
         (Self::VERTICAL_INVALID, "vertical pose invalid"),
-        (Self::PLANAR_HELD, "planar pose held"),
-        (Self::VERTICAL_HELD, "vertical pose held"),
-        (Self::FRAMES_MISSED, "frames missed"),
-        (Self::FRAME_REPEATED, "frame repeated"),
-        (Self::ZERO_SET, "zero deviation subtracted"),
         (
             Self::TEMPERATURE_MISSING,
             "temperature missing or implausible",
         ),
+        (Self::FORCED, "parameters written by --force"),
+        (Self::FRAMES_MISSED, "frames missed"),
+        (Self::FRAME_REPEATED, "frame repeated"),
+        (Self::ZERO_SET, "zero deviation subtracted"),
+        (Self::PLANAR_HELD, "planar pose held"),
+        (Self::VERTICAL_HELD, "vertical pose held"),
     ];
 
     /// The mask as a number, for bus and log.
@@ -152,9 +157,42 @@ impl Status {
     }
 }
 
+impl core::ops::BitOr for Status {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        self.with(other)
+    }
+}
+
+/// The names of the bits that are set, or "good".
+impl core::fmt::Display for Status {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.is_good() {
+            return f.write_str("good");
+        }
+        for (k, name) in self.names().enumerate() {
+            f.write_str(if k > 0 { ", " } else { "" })?;
+            f.write_str(name)?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn a_status_is_shown_by_the_names_of_its_bits() {
+        assert_eq!(Status::ZERO_SET.to_string(), "good");
+        let two = Status::PLANAR_INVALID | Status::HALL_A;
+        let shown = "Hall code A bad, planar pose invalid";
+        assert_eq!(two.to_string(), shown);
+    }
 
     #[test]
     fn every_bit_of_the_table_has_one_name() {

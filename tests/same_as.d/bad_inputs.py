@@ -78,7 +78,6 @@ def bad_inputs(inputs):
         yield Case(f"log, {name}: fit (30)", ["fit", *log, *FIT, "--model", "30"])
         yield Case(f"log, {name}: eval", ["eval", blob, *log, "--json", "e.json"])
         yield Case(f"log, {name}: decode", decode)
-        yield Case(f"log, {name}: decode, hold", [*decode, "--hold", "2"])
 
     stages = {
         "negative scale": ("m_per_count = 6.25e-8", "m_per_count = -6.25e-8"),

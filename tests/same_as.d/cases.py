@@ -111,9 +111,7 @@ def readers(log):
         for delta in ([], ["--delta", "fit"], ["--delta", "zero"]):
             arguments = ["eval", blob, *log.arguments, *delta, "--json", "eval.json"]
             yield Case(f"{name}: eval {' '.join(delta)}", arguments)
-        for hold in ([], ["--hold", "5"]):
-            arguments = ["decode", blob, *log.arguments, "--out", "pose.csv", *hold]
-            yield Case(f"{name}: decode {' '.join(hold)}", arguments)
+        yield Case(f"{name}: decode", ["decode", blob, *log.arguments, "--out", "pose.csv"])
         yield Case(f"{name}: inspect", ["inspect", blob, "--json", "inspect.json"])
         yield Case(f"{name}: inspect as text", ["inspect", blob])
 

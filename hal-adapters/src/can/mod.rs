@@ -53,4 +53,4 @@ pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, sent in [`Message::NodeStatus`].
-pub const PROTOCOL_VERSION: u8 = 6;
+pub const PROTOCOL_VERSION: u8 = 7;

@@ -1,5 +1,5 @@
-//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and the status in 20
-//! bits: see [`status_to_bus`]. So the bits on the bus are the bits of the decoder, and each frame says
+//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and bits 0 to 19 of the
+//! status: see [`status_to_bus`]. So the bits on the bus are the bits of the decoder, and each frame says
 //! whether its value may be used.
 //!
 //! ```
@@ -34,24 +34,10 @@ const PLANAR: [Message; 3] = [Message::PoseX, Message::PoseY, Message::PoseRz];
 /// The vertical axes.
 const VERTICAL: [Message; 3] = [Message::PoseZ, Message::PoseRx, Message::PoseRy];
 
-/// Bit 15 on the bus is [`Status::TEMPERATURE_MISSING`]. [`Status::PLANAR_HELD`] is not sent: a held pose is invalid.
-const MISSING_ON_BUS: u32 = Status::PLANAR_HELD.bits();
-
-/// The 20 bits of a status on the bus.
+/// The lowest 20 bits of a status. The bits above say that a pose is held, and a held pose is invalid.
 #[inline(always)]
 pub const fn status_to_bus(status: Status) -> u32 {
-    let others = status.bits() & (u32::MAX >> (32 - SHORT_BITS)) & !MISSING_ON_BUS;
-    let is_missing = status.any(Status::TEMPERATURE_MISSING) as u32;
-    others | is_missing << MISSING_ON_BUS.trailing_zeros()
-}
-
-/// The status of a pose frame, from its 20 bits.
-pub const fn status_from_bus(bits: u32) -> Status {
-    let others = Status::from_bits(bits & !MISSING_ON_BUS);
-    if bits & MISSING_ON_BUS == 0 {
-        return others;
-    }
-    others.with(Status::TEMPERATURE_MISSING)
+    status.bits() & (u32::MAX >> (32 - SHORT_BITS))
 }
 
 const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
@@ -196,7 +182,7 @@ fn received(tick: &GroupTick) -> ReceivedPose {
                     .iter()
                     .all(|axis| axis.is_finite()) =>
         {
-            status_from_bus(x.short)
+            Status::from_bits(x.short)
         }
         _ => lost,
     };
@@ -284,7 +270,7 @@ impl PoseReceiver {
         if let Some(payload) = payload {
             *self.vertical.get_mut(k)? = Some(ReceivedAxis {
                 value: f32::from_bits(payload.long),
-                status: status_from_bus(payload.short),
+                status: Status::from_bits(payload.short),
                 time_us,
             });
         }

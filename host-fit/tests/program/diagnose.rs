@@ -1,6 +1,6 @@
 //! What the program says of logs with mistakes that labs make, and that it writes no blob of them.
 
-use crate::common::{self, Bench, column, number, rows, stderr, thinned_log};
+use crate::common::{self, Bench, column, number, rows, stderr, stdout, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// Every fiftieth row of the shipped log.
@@ -87,6 +87,8 @@ fn a_fit_beyond_its_limits_is_not_written_without_force() {
     bench.good(&format!("{fit} x=1nm --force"));
     bench.good("inspect p.bin --json i.json");
     assert_eq!(bench.json("i.json")["fit"]["forced"], true);
+    let decoded = bench.good("decode p.bin log.csv --out pose.csv");
+    assert!(stdout(&decoded).contains("rows: parameters written by --force"));
     bench.good(&format!("{fit} x=1.5um,y=1um,rz=4urad"));
     bench.good("inspect p.bin --json i.json");
     assert_eq!(bench.json("i.json")["fit"]["forced"], false);

@@ -132,18 +132,20 @@ pub const HALL_STATUS_PLANAR_EXTRAPOLATED: u32 = 1 << 12;
 pub const HALL_STATUS_PLANAR_INVALID: u32 = 1 << 13;
 /// Z, Rx, Ry are invalid.
 pub const HALL_STATUS_VERTICAL_INVALID: u32 = 1 << 14;
-/// X, Y, Rz are the last valid ones, repeated.
-pub const HALL_STATUS_PLANAR_HELD: u32 = 1 << 15;
-/// Z, Rx, Ry are the last valid ones, repeated.
-pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 16;
+/// A temperature is missing or implausible: decoded as if at T0 of the calibration.
+pub const HALL_STATUS_TEMPERATURE_MISSING: u32 = 1 << 15;
+/// The parameters were written by `host-fit fit --force`: their log was refused.
+pub const HALL_STATUS_FORCED: u32 = 1 << 16;
 /// One or more servo periods before this frame had no frame.
 pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
 /// The frame repeats an earlier sequence number.
 pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
 /// A zero deviation is subtracted from X, Y, Rz. No fault.
 pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
-/// A temperature is missing or implausible: decoded as if at T0 of the calibration.
-pub const HALL_STATUS_TEMPERATURE_MISSING: u32 = 1 << 20;
+/// X, Y, Rz are the last valid ones, repeated.
+pub const HALL_STATUS_PLANAR_HELD: u32 = 1 << 20;
+/// Z, Rx, Ry are the last valid ones, repeated.
+pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 21;
 
 impl HallPlanarPose {
     pub(crate) const ZERO: Self = Self {

@@ -44,10 +44,8 @@ pub(super) fn state(shown: &Shown<'_>) -> String {
         "no frames yet".to_owned()
     } else if shown.is_stale {
         "stale: no good frames".to_owned()
-    } else if status.is_good() {
-        "good".to_owned()
     } else {
-        status.names().collect::<Vec<_>>().join(", ")
+        status.to_string()
     }
 }
 

@@ -68,7 +68,7 @@ pub fn follow_the_stage(bench: &Bench) {
 }
 
 /// The bit of a valid pose on the bus with a missing temperature.
-const MARK: u32 = Status::PLANAR_HELD.bits();
+const MARK: u32 = Status::TEMPERATURE_MISSING.bits();
 
 /// The words equal the host's words at the last temperatures on the bus. Returns their number.
 fn same_words(bench: &Bench, set: &ParameterSet, seen: &Seen, what: &str) -> u64 {
