@@ -4,7 +4,7 @@ use super::{History, Scale, ScopeRow, Screen, Wish};
 use hallstage_input::dataset::Row;
 use hallstage_input::log::layout::LogLayout;
 use hallstage_input::log::table::Table;
-use hallstage_input::log::{BadRows, LogError, LogRows, ReadOptions};
+use hallstage_input::log::{BadRows, LogError, LogProblem, LogRows, ReadOptions};
 use hallstage_input::source::{SourceError, SourceProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
@@ -125,7 +125,17 @@ impl<'s> GrowingLog<'s> {
             None => {
                 let text = TextReader::from_reader(&*bytes, &self.path)?;
                 let layout: &LogLayout = &self.stage.log;
-                let lines = Table::open(text, |name| layout.knows(name))?.row_line();
+                let lines = match Table::open(text, |name| layout.knows(name)) {
+                    // Comments so far.
+                    Err(LogError {
+                        problem: LogProblem::Empty,
+                        ..
+                    }) => {
+                        self.taken = 0;
+                        return Ok(());
+                    }
+                    table => table?.row_line(),
+                };
                 let above = bytes.split_inclusive(|byte| *byte == b'\n').take(lines);
                 self.head = Some(above.flatten().copied().collect());
                 Vec::new()
@@ -238,6 +248,25 @@ mod tests {
         );
         let first = history.window().next().expect("rows");
         assert!(first.designed_m.is_some());
+    }
+
+    #[test]
+    fn comments_wait_for_a_header_and_a_log_may_begin_anew() {
+        let (stage, log) = (stage(), log());
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        let mut growing = GrowingLog::new(file.path(), &stage);
+        let mut history = History::new(String::new(), scales(&stage), 1.0);
+        let mut rows = |text: &str| {
+            std::fs::write(file.path(), text).expect("written");
+            growing.read_on(&mut history).map(|()| history.counts)
+        };
+        let ends: Vec<usize> = log.match_indices('\n').map(|(at, _)| at + 1).collect();
+        assert_eq!(rows("# by hand\n").expect("comments"), [0, 0]);
+        let noted = format!("# by hand\n{}", &log[..ends[100]]);
+        assert_eq!(rows(&noted).expect("rows"), [100, 0]);
+        // A shorter file is another one; its clock starts again, which is no gap.
+        assert_eq!(rows(&log[..ends[50]]).expect("rows"), [150, 0]);
+        assert_eq!(rows(&log[..ends[60]]).expect("rows"), [160, 0]);
     }
 
     #[test]
