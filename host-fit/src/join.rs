@@ -21,8 +21,12 @@ pub use error::JoinError;
 
 use crate::bus::BusAddress;
 use crate::bus::bus_log::BusCounts;
+use crate::cli::arguments::{between, choice};
 use crate::output::Output;
+use clap::Args;
 use hallstage_input::finding::Finding;
+use hallstage_input::log::BadRows;
+use hallstage_input::log::cell::WHOLE_MAX;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
 use hallstage_input::watch::Watch;
@@ -32,30 +36,52 @@ use pairing::{JoinCounts, join};
 use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
 use sensors::{Sensors, sensors_first};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Settings of `join`.
-#[derive(Clone, Debug)]
+/// The two records, and how they are joined.
+#[derive(Clone, Debug, Args)]
 pub(crate) struct JoinSettings {
-    /// The records of the sensors and of the reference, in any order: a record of the bus, as `record`,
-    /// `live --record` or `candump` writes it, or tables in the columns that stage.toml names.
-    pub(crate) records: [PathBuf; 2],
+    /// The record of the sensors: of the bus, as `record`, `live --record` or `candump` writes it, or a table with
+    /// Hall probes and gaps. The other file is the reference.
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+    /// The record of the reference: a table with time, movement and beams (or pose). Columns of tables are those that
+    /// stage.toml names.
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
     /// The stage as designed.
+    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
     pub(crate) stage: PathBuf,
     /// Where to write the calibration log.
+    #[arg(long, value_name = "LOG.csv")]
     pub(crate) out: PathBuf,
     /// Largest time from a row of the sensors to the samples of the reference before and after it, us; the longer of
     /// the periods of the two records if not given.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) tolerance_us: Option<u32>,
     /// Start of the search: time of the sensors less time of the reference, us.
+    #[arg(long, value_name = "US", allow_negative_numbers = true, value_parser = microseconds)]
     pub(crate) offset_us: Option<f64>,
     /// How far from its start, or from a common start of both records, the offset is searched, s. Without it and
-    /// without a start, everywhere where half of the shorter record has a partner.
+    /// without a start: wherever half of the shorter record has a partner.
+    #[arg(long, value_name = "SECONDS", value_parser = search_seconds)]
     pub(crate) search_s: Option<f64>,
-    /// Only frames of this interface, where the record holds several; can0@5 for the frames of node 5.
+    /// Only frames of this interface, where a record of the bus holds several; can0@5 for the frames of node 5.
+    #[arg(long, value_name = "IFACE")]
     pub(crate) interface: Option<BusAddress>,
-    /// Leave out lines that cannot be read, and count them.
-    pub(crate) skip_bad_lines: bool,
+    /// What to do with rows that cannot be used, and with lines of a record of the bus that cannot be read.
+    #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
+    pub(crate) bad_rows: BadRows,
+}
+
+/// A time that is exact in `f64`.
+fn microseconds(text: &str) -> Result<f64, String> {
+    between(text, -WHOLE_MAX, WHOLE_MAX, "a number of microseconds")
+}
+
+/// For records further apart than an hour, `--offset-us` gives the start.
+fn search_seconds(text: &str) -> Result<f64, String> {
+    between(text, 0.0, 3600.0, "a number of seconds")
 }
 
 /// The result of a join.
@@ -82,8 +108,26 @@ impl JoinReport {
     }
 }
 
+/// Most rows of a table: two hours at 1 kHz.
+const ROWS_MAX: usize = 7_200_000;
+
 /// Bytes of the log that are written at a time, about.
 const TEXT_BYTES: usize = 1 << 16;
+
+/// Checks that one more row is not too many.
+///
+/// # Errors
+/// `TooLong`.
+fn check_length(path: &Path, rows: usize) -> Result<(), JoinError> {
+    match rows < ROWS_MAX {
+        true => Ok(()),
+        false => Err(JoinError::TooLong {
+            path: path.to_path_buf(),
+            what: "rows",
+            most: ROWS_MAX,
+        }),
+    }
+}
 
 /// Reads both records, joins them and writes the log.
 ///
@@ -91,10 +135,9 @@ const TEXT_BYTES: usize = 1 << 16;
 /// See [`JoinError`]; nothing is written then.
 pub(crate) fn run(settings: &JoinSettings, watch: Watch<'static>) -> Result<JoinReport, JoinError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let [a, b] = settings.records.each_ref().map(PathBuf::as_path);
-    let [sensors, reference] = sensors_first(a, b, &stage)?;
+    let [sensors, reference] = sensors_first(&settings.a, &settings.b, &stage)?;
     let sensors = Sensors::read(sensors, settings, &stage, watch)?;
-    let reference = Reference::read(reference, &stage, watch)?;
+    let reference = Reference::read(reference, settings.bad_rows, &stage, watch)?;
     reference.check_speed(&stage)?;
     let records = Records::new(&sensors, &reference, &stage);
     let (clocks, offset) = records.estimate(settings.offset_us, settings.search_s)?;

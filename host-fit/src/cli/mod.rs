@@ -37,6 +37,7 @@ pub use fit_options::FitOptions;
 
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
+use crate::join::JoinSettings;
 use crate::output::{
     blob_file, check_writable, is_standard, is_standard_output, keep_apart, posterior_file,
 };
@@ -107,7 +108,7 @@ commands! {
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
     /// Join the records of the sensors and of the interferometers, each with its own clock, into a log.
     #[command(visible_alias = "import")]
-    Join(join::JoinArgs) => join::run,
+    Join(JoinSettings) => join::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.

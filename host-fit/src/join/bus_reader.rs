@@ -6,6 +6,7 @@ use crate::bus::bus_log::{BusCounts, BusTick, Collector};
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
+use hallstage_input::log::BadRows;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::lines::Lines;
 use hallstage_input::stage::Stage;
@@ -74,7 +75,7 @@ pub(super) fn read(
 }
 
 /// Fewest ticks of a record: a quarter of a second.
-const TICKS_MIN: usize = 125;
+pub(super) const TICKS_MIN: usize = 125;
 
 /// A record of the bus while it is read.
 struct BusReader<'s> {
@@ -110,7 +111,7 @@ impl BusReader<'_> {
                 self.counts.other_lines += 1;
                 Ok(())
             }
-            Err(_) if self.settings.skip_bad_lines => {
+            Err(_) if self.settings.bad_rows == BadRows::Skip => {
                 self.counts.bad_lines += 1;
                 Ok(())
             }

@@ -17,7 +17,7 @@ pub enum JoinError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// A line of the record is broken.
-    #[error("{}, line {line}: {fault}; mend the line, or skip such lines with --skip-bad-lines", path.display())]
+    #[error("{}, line {line}: {fault}; mend the line, or skip such lines with --bad-rows skip", path.display())]
     BadLine {
         /// The record.
         path: PathBuf,
@@ -105,6 +105,12 @@ pub enum JoinError {
         /// The other interface.
         other: String,
     },
+    /// A table has no interface.
+    #[error("{}: --interface chooses frames of a record of the bus, and this is a table; leave --interface out", path.display())]
+    NoInterface {
+        /// The table.
+        path: PathBuf,
+    },
     /// The record holds no whole ticks that can be timed.
     #[error(
         "{}: no tick can be timed: {frames} frames are {ticks} whole ticks, {saturated} with a code at a rail of its converter; it takes \
@@ -176,8 +182,8 @@ pub enum JoinError {
     #[error(
         "most of the two records do not belong together: {} of {} ticks have a reference, which covers {:.1} s of \
          the reference's {:.1} s. On its clock the ticks lie from {:.0} to {:.0} us, its samples from {:.0} to {:.0} us; {} ticks \
-         are outside its time, {} between movements, {} further than --tolerance-us (one servo period, if it is not given) from \
-         a sample. Name records of one run; cut what one record has more than the other; log the reference in every servo period, or give a larger --tolerance-us",
+         are outside its time, {} between movements, {} further than --tolerance-us (the longer of the two periods, if it is not given) from \
+         a sample. Name records of one run; cut what one record has more than the other, or give a larger --tolerance-us",
         .0.rows, .0.ticks, .0.covered_s, .0.reference_s, .0.sensors_us[0], .0.sensors_us[1], .0.reference_us[0], .0.reference_us[1],
         .0.outside, .0.between_movements, .0.too_far
     )]

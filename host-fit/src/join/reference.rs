@@ -1,6 +1,6 @@
 //! The log of the interferometers.
 
-use super::JoinError;
+use super::{JoinError, check_length};
 use hallstage_input::log::cell::{CellFault, WHOLE_MAX};
 use hallstage_input::log::header::{Header, Source};
 use hallstage_input::log::layout::{Dimension, Quantity};
@@ -8,7 +8,7 @@ use hallstage_input::log::order::{Order, OrderCells};
 use hallstage_input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
 use hallstage_input::log::table::Table;
 use hallstage_input::log::time::Clock;
-use hallstage_input::log::{LogError, LogProblem};
+use hallstage_input::log::{BadRows, LogError, LogProblem};
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 use hallstage_input::watch::Watch;
@@ -30,6 +30,8 @@ pub struct Sample {
 pub struct ReferenceCounts {
     /// Rows.
     pub rows: usize,
+    /// Skipped rows with a bad cell.
+    pub bad: usize,
     /// Skipped rows with the time of the row before.
     pub duplicates: usize,
     /// Places with more than one and a half of the usual time between rows of a movement.
@@ -63,9 +65,6 @@ const HELD_ROWS: f64 = 1.5;
 /// Error of a cubic in the middle between samples, in fourth differences.
 const CUBIC: f64 = 3.0 / 128.0;
 
-/// Most rows of a log: two hours at 1 kHz.
-const ROWS_MAX: usize = 7_200_000;
-
 /// A log of the reference.
 pub(super) struct Reference {
     /// The quantities of the three values.
@@ -86,6 +85,7 @@ impl Reference {
     /// `TooLong`.
     pub(super) fn read(
         path: &Path,
+        bad_rows: BadRows,
         stage: &Stage,
         watch: Watch<'static>,
     ) -> Result<Self, JoinError> {
@@ -106,15 +106,15 @@ impl Reference {
         };
         let (mut samples, mut clock, mut shift_us) = (Vec::<Sample>::new(), Clock::default(), 0.0);
         while table.next_row()? {
+            check_length(&table.head.path, counts.rows)?;
             counts.rows += 1;
-            if counts.rows > ROWS_MAX {
-                return Err(JoinError::TooLong {
-                    path: table.head.path,
-                    what: "rows",
-                    most: ROWS_MAX,
-                });
-            }
-            let mut sample = cells.sample(&table, &mut clock)?;
+            let mut sample = match cells.sample(&table, &mut clock) {
+                Err(_) if bad_rows == BadRows::Skip => {
+                    counts.bad += 1;
+                    continue;
+                }
+                read => read?,
+            };
             let (line, named) = (table.row_line(), Some(sample.movement));
             match order.take(&table.head, line, named, sample.t_us) {
                 Err(LogError {

@@ -1,23 +1,20 @@
 //! A record of the sensors: of the bus, or a table with the codes of the Hall probes and of the gaps.
 
 use super::node_clock::Tick;
-use super::{JoinError, JoinSettings, bus_reader};
+use super::{JoinError, JoinSettings, bus_reader, check_length};
 use crate::bus::bus_log::BusCounts;
 use hallstage_input::dataset::Row;
 use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::log::header::Header;
 use hallstage_input::log::layout::Quantity;
 use hallstage_input::log::table::Table;
-use hallstage_input::log::{BadRows, LogError, LogRows, Place, ReadOptions};
+use hallstage_input::log::{LogError, LogRows, Place, ReadOptions};
 use hallstage_input::other_format;
 use hallstage_input::source::SourceProblem;
 use hallstage_input::stage::Stage;
 use hallstage_input::text::TextReader;
 use hallstage_input::watch::Watch;
 use std::path::Path;
-
-/// Most rows of a table: two hours at 1 kHz.
-const ROWS_MAX: usize = 7_200_000;
 
 /// A record of the sensors with its own clock.
 pub(super) struct Sensors {
@@ -39,7 +36,7 @@ impl Sensors {
     /// Reads a record.
     ///
     /// # Errors
-    /// Errors of a log and of a record of the bus; `TimeRestarts`, `TooLong`.
+    /// Errors of a log and of a record of the bus; `TimeRestarts`, `TooLong`, `NoInterface`.
     pub(super) fn read(
         path: &Path,
         settings: &JoinSettings,
@@ -68,14 +65,14 @@ impl Sensors {
         watch: Watch<'static>,
     ) -> Result<Self, JoinError> {
         let options = ReadOptions {
-            bad_rows: match settings.skip_bad_lines {
-                true => BadRows::Skip,
-                false => BadRows::Refuse,
-            },
+            bad_rows: settings.bad_rows,
             watch,
             ..ReadOptions::SENSORS
         };
         let path = text.path().to_path_buf();
+        if settings.interface.is_some() {
+            return Err(JoinError::NoInterface { path });
+        }
         let mut rows = LogRows::new(text, "reading the sensors", stage, &options)?;
         let mut ticks: Vec<Tick> = Vec::new();
         while let Some(found) = rows.next_row()? {
@@ -90,13 +87,7 @@ impl Sensors {
                     movement: found.movement,
                 });
             }
-            if ticks.len() == ROWS_MAX {
-                return Err(JoinError::TooLong {
-                    path,
-                    what: "rows",
-                    most: ROWS_MAX,
-                });
-            }
+            check_length(&path, ticks.len())?;
             ticks.push(tick);
         }
         let period_us = rows.period_us();

@@ -2,6 +2,7 @@
 
 use super::tests::{Import, files, hall, reference, reference_of};
 use super::*;
+use hallstage_input::finding::Kind;
 use std::fmt::Write;
 
 /// Time of the sensors less time of the reference, us.
@@ -54,7 +55,7 @@ fn tables_are_joined_in_any_order_whatever_their_rates_ends_and_gaps() {
     let report = join.run();
     assert!(report.join.rows > 720);
     join.check_poses(1e-9);
-    let swapped = join.with(|settings| settings.records.reverse());
+    let swapped = join.with(|settings| std::mem::swap(&mut settings.a, &mut settings.b));
     assert_eq!(swapped.run(), report);
 }
 
@@ -113,6 +114,44 @@ fn slips_with_units_signs_and_columns_are_named_before_a_clock_is_blamed() {
     let exchanged = table.replace("Hall A,Hall B,Hall C", "Hall C,Hall B,Hall A");
     let error = refused(&exchanged, &reference());
     assert!(error.contains("hall_a and hall_c exchanged"), "{error}");
+    let turned = |text: &str, column: usize| -> String {
+        let row = |line: &str| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if let Ok(number) = cells[column].parse::<f64>() {
+                cells[column] = (-number).to_string();
+            }
+            cells.join(",") + "\n"
+        };
+        text.lines().map(row).collect()
+    };
+    for (column, key) in [(2, "ifm_x"), (4, "ifm_y2")] {
+        let error = refused(&table, &turned(&reference(), column));
+        assert!(
+            error.contains(&format!("the sign of {key} turned")),
+            "{error}"
+        );
+    }
+    let error = refused(&turned(&table, 5), &reference());
+    assert!(error.contains("the sign of hall_b turned"), "{error}");
+}
+
+#[test]
+fn a_table_of_the_sensors_may_skip_bad_rows_and_has_no_interface() {
+    let table = sensors(0.0, 2_000.0, |_| true);
+    let spoilt = table.replacen(",100,101,99,", ",100,x,99,", 3);
+    let join = tables(&spoilt, &reference());
+    join.refused(|error| matches!(error, JoinError::Log(_)));
+    let report = join
+        .with(|settings| settings.bad_rows = BadRows::Skip)
+        .run();
+    // The reference has the movements.
+    let [found] = report.warnings.as_slice() else {
+        panic!("{:?}", report.warnings);
+    };
+    assert!(matches!(found.kind, Kind::RowsSkipped { rows: 3, .. }));
+    let bus = "can0".parse().expect("an interface");
+    let join = tables(&table, &reference()).with(|settings| settings.interface = Some(bus));
+    join.refused(|error| matches!(error, JoinError::NoInterface { .. }));
 }
 
 #[test]

@@ -118,14 +118,15 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), hallstage_input::shipped::STAGE_TOML).expect("written");
     let settings = JoinSettings {
-        records: [path("bus.log"), path("ifm.csv")],
+        a: path("bus.log"),
+        b: path("ifm.csv"),
         stage: path("stage.toml"),
         out: path("log.csv"),
         tolerance_us: None,
         offset_us: None,
         search_s: Some(0.4),
         interface: None,
-        skip_bad_lines: false,
+        bad_rows: BadRows::Refuse,
     };
     Import {
         _folder: folder,
@@ -228,6 +229,23 @@ fn a_given_offset_is_the_start_of_the_search() {
     }
 }
 
+/// Three rows of one movement have a partner in another, which explains them with its axes exchanged.
+#[test]
+fn a_few_rows_blame_no_column_and_no_unit() {
+    let ifm = reference();
+    let (head, rows) = ifm.split_once('\n').expect("a header");
+    let second: Vec<&str> = rows.lines().skip(500).take(500).collect();
+    for scale in ["_nm", "_pm"] {
+        let ifm = format!("{}\n{}\n", head.replace("_nm", scale), second.join("\n"));
+        let import = files(&candump(|_, _| false), &ifm).with(|settings| {
+            (settings.search_s, settings.offset_us) = (Some(0.01), Some(OFFSET_US - 500_000.0));
+        });
+        import.refused(|error| matches!(error, JoinError::NoOffset { .. }));
+        let import = import.with(|settings| settings.offset_us = Some(OFFSET_US + 490_000.0));
+        import.refused(|error| matches!(error, JoinError::NoOffset { .. }));
+    }
+}
+
 /// The motion is 212 um rms. With noise of 40 um 96 % of it is explained, but the offset is uncertain by a quarter
 /// of a servo period.
 #[test]
@@ -314,7 +332,9 @@ fn a_broken_line_is_refused_with_its_number_or_left_out() {
             }
         )
     });
-    let report = import.with(|settings| settings.skip_bad_lines = true).run();
+    let report = import
+        .with(|settings| settings.bad_rows = BadRows::Skip)
+        .run();
     assert_eq!(report.bus().bad_lines, 1);
 }
 
@@ -344,6 +364,13 @@ fn a_fault_of_the_reference_has_its_place() {
         let is_told = message.contains(place) && message.contains("; ");
         assert!(is_told, "{message}");
     }
+    let spoilt = reference().replacen("0,50000,", "0,50000,x", 1);
+    let import = files(&candump(|_, _| false), &spoilt);
+    import.refused(|error| matches!(error, JoinError::Log(_)));
+    let report = import
+        .with(|settings| settings.bad_rows = BadRows::Skip)
+        .run();
+    assert_eq!((report.reference.bad, report.reference.gaps), (1, 1));
 }
 
 #[test]
@@ -354,7 +381,7 @@ fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
     let two = "(1.000000) can0 123#00\n(1.000000) can1 123#00\n";
     let two = files(two, &ifm);
     two.refused(|error| matches!(error, JoinError::SeveralInterfaces { line: 2, .. }));
-    let no_file = files("", &ifm).with(|settings| settings.records[0] = "/no/such/file".into());
+    let no_file = files("", &ifm).with(|settings| settings.a = "/no/such/file".into());
     no_file.refused(|error| matches!(error, JoinError::Log(_)));
 }
 

@@ -21,7 +21,7 @@ fn ctrl_c_ends_a_command_that_reads_and_leaves_nothing_behind() {
         ("fit - --out o.bin --json o.json --report o", log.as_str()),
         ("check - --json o.json", &log),
         ("decode p.bin - --out o.csv", &log),
-        ("join - ifm.csv --out o.csv --skip-bad-lines", bus),
+        ("join - ifm.csv --out o.csv --bad-rows skip", bus),
     ] {
         let (running, mut pipe) = bench.reading(arguments);
         let lines = "# nothing\n".repeat(LINES);

@@ -3,6 +3,7 @@
 use super::search::{SEARCH_PERIODS, SEARCH_TICKS};
 use super::{EXPLAINED_MIN, Records};
 use crate::join::JoinError;
+use crate::join::bus_reader::TICKS_MIN;
 use crate::join::node_clock::Tick;
 use crate::join::offset::Clocks;
 use crate::join::reference::Sample;
@@ -71,8 +72,9 @@ impl Records<'_> {
             .map(|[_, sp, pp]| self.stage.hall.m_per_count * sp / pp);
         factors.sort_by(f64::total_cmp);
         let factor = factors[1];
-        // Without common rows it is no number.
-        let is_size = factor > 0.0 && explained >= EXPLAINED_MIN * motion;
+        // A few rows have any size. Without common rows it is no number.
+        let is_size =
+            rows.len() >= TICKS_MIN && factor > 0.0 && explained >= EXPLAINED_MIN * motion;
         match is_size && !(FACTOR_MAX.recip()..FACTOR_MAX).contains(&factor) {
             true => Err(JoinError::Unit { factor }),
             false => Ok(()),
@@ -88,7 +90,7 @@ impl Records<'_> {
             let near = records.best(minute, SEARCH_TICKS, records.range_us, step_us);
             let rows = records.rows(minute, &near);
             let [explained, motion] = records.explained(&rows);
-            let has_partners = 2 * rows.len() >= minute.len();
+            let has_partners = rows.len() >= TICKS_MIN && 2 * rows.len() >= minute.len();
             if has_partners {
                 explained / motion
             } else {

@@ -18,5 +18,5 @@ static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
 fuzz_target!(|record: &[u8]| {
     FOLDER.write("bus", record);
     FOLDER.join(&[]);
-    FOLDER.join(&["--skip-bad-lines"]);
+    FOLDER.join(&["--bad-rows", "skip"]);
 });
