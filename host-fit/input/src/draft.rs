@@ -149,19 +149,8 @@ impl LogColumn {
 fn decide_by_neighbours(columns: &mut [LogColumn]) {
     let has = |quantity| columns.iter().any(|c| c.quantity == Some(quantity));
     let beam = has(Quantity::BeamY1) && !has(Quantity::BeamX) && !has(Quantity::Y);
-    if !has(Quantity::Time) {
-        let grows = |column: &LogColumn| column.step().filter(|_| column.quantity.is_none());
-        let is_time = |c: &LogColumn| grows(c).is_some() && c.scale(Dimension::Time).is_some();
-        let is_counter = |c: &LogColumn| grows(c) == Some(1.0) && c.unit.is_none();
-        let time = columns.iter().position(is_time);
-        let counter = || columns.iter().position(is_counter);
-        if let Some(time) = time.or_else(counter).and_then(|time| columns.get_mut(time)) {
-            time.quantity = Some(Quantity::Time);
-            let rows = || "rows".to_owned();
-            time.unit.get_or_insert_with(rows);
-        }
-    }
-    for column in columns {
+    let has_time = has(Quantity::Time);
+    for column in &mut *columns {
         if beam && column.quantity == Some(Quantity::X) {
             column.quantity = Some(Quantity::BeamX);
         }
@@ -171,6 +160,27 @@ fn decide_by_neighbours(columns: &mut [LogColumn]) {
         {
             let unit = STEPS.iter().find(|(_, least)| step >= *least);
             column.unit = unit.map(|(unit, _)| (*unit).to_owned());
+        }
+    }
+    if has_time {
+        return;
+    }
+    let grows = |column: &LogColumn| column.step().filter(|_| column.quantity.is_none());
+    let is_time = |c: &LogColumn| grows(c).is_some() && c.scale(Dimension::Time).is_some();
+    let is_counter = |c: &LogColumn| grows(c) == Some(1.0) && c.unit.is_none();
+    // Its unit is to be filled in.
+    let is_bare = |c: &LogColumn| grows(c).is_some() && c.unit.is_none();
+    let time = columns.iter().position(is_time);
+    let counter = columns.iter().position(is_counter);
+    let bare = || columns.iter().position(is_bare);
+    if let Some(column) = time
+        .or(counter)
+        .or_else(bare)
+        .and_then(|at| columns.get_mut(at))
+    {
+        column.quantity = Some(Quantity::Time);
+        if time.is_none() && counter.is_some() {
+            column.unit = Some("rows".to_owned());
         }
     }
 }

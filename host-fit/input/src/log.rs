@@ -23,6 +23,7 @@ mod stream;
 pub mod table;
 pub mod time;
 pub mod units;
+mod words;
 
 pub use cell::CellFault;
 pub use error::{LogError, LogProblem, Place};

@@ -63,7 +63,7 @@ const BINARY: [(&[u8], &str); 19] = [
 ];
 
 /// Text formats by their first bytes, as the binary ones.
-const TEXT: [(&[u8], &str); 6] = [
+const TEXT: [(&[u8], &str); 7] = [
     (
         b"(",
         "a record of the CAN bus by candump; host-fit join joins it with the reference to a log",
@@ -81,6 +81,7 @@ const TEXT: [(&[u8], &str); 6] = [
         "a record of the CAN bus by SavvyCAN (GVRET); save it as candump log for host-fit join",
     ),
     (b"{", "JSON; write its numbers as CSV"),
+    (b"[{", "JSON; write its numbers as CSV"),
     (b"<", "XML or HTML; write its numbers as CSV"),
 ];
 

@@ -1,6 +1,6 @@
 //! One cell of a log as a number, or what is wrong with it.
 
-use super::decimal;
+use super::decimal::{self, NumberForm};
 use super::layout::Dimension;
 use crate::axis::sign;
 use crate::stage::CodeScale;
@@ -45,9 +45,12 @@ pub enum CellFault {
         /// Its text, shortened.
         text: String,
     },
-    /// NaN.
-    #[error("NaN stands for a missing value; remove the row")]
-    Nan,
+    /// A word for a missing value, such as NaN.
+    #[error("\"{text}\" stands for a missing value; remove the row")]
+    Missing {
+        /// The word.
+        text: String,
+    },
     /// An infinity.
     #[error("\"{text}\" is infinite; remove the row")]
     Infinite {
@@ -75,6 +78,17 @@ pub enum CellFault {
         /// The largest sensible magnitude.
         limit: f64,
         /// The unit of both.
+        unit: &'static str,
+    },
+    /// A temperature that no stage has.
+    #[error(
+        "{celsius:.0} \u{b0}C cannot be right. Is the column in {}? Set unit = \"{unit}\" in [temperature].",
+        unit.replace('C', "\u{b0}C")
+    )]
+    Temperature {
+        /// The temperature, degC.
+        celsius: f64,
+        /// The unit that the column may have.
         unit: &'static str,
     },
     /// A code that the converter cannot give.
@@ -105,6 +119,18 @@ impl CellFault {
         matches!(self, Self::OutsideConverter { .. } | Self::Saturated { .. })
     }
 
+    /// Whether a cell holds no number.
+    pub(super) const fn is_text(&self) -> bool {
+        matches!(
+            self,
+            Self::Empty
+                | Self::Missing { .. }
+                | Self::NotANumber { .. }
+                | Self::NotATime { .. }
+                | Self::DecimalPoint { .. }
+        )
+    }
+
     /// The reason to leave a row out, in words.
     pub(super) const fn reason(&self) -> &'static str {
         match self {
@@ -112,13 +138,33 @@ impl CellFault {
             Self::NotANumber { .. } | Self::DecimalPoint { .. } => "a cell that is not a number",
             Self::NotATime { .. } => "a time that cannot be read",
             Self::OtherTime { .. } => "a time written in another way than the first",
-            Self::Nan | Self::Infinite { .. } => "a NaN or an infinity",
+            Self::Missing { .. } | Self::Infinite { .. } => "a missing value or an infinity",
             Self::NotWhole { .. } => "a fraction where a whole number belongs",
-            Self::Absurd { .. } => "an absurd number",
+            Self::Absurd { .. } | Self::Temperature { .. } => "an absurd number",
             Self::OutsideConverter { .. } => "a code outside the converter's range",
             Self::Saturated { .. } => "a saturated code",
         }
     }
+}
+
+/// Words for a missing value; those of spreadsheets and of C have a `#`.
+const MISSING: [&[u8]; 8] = [
+    b"nan",
+    b"na",
+    b"n/a",
+    b"nat",
+    b"null",
+    b"none",
+    b"nil",
+    b"\xe2\x88\x9e",
+];
+
+/// Whether a text stands for a missing value.
+fn is_missing(text: &[u8]) -> bool {
+    let is_dash = text.iter().all(|byte| *byte == b'-');
+    let word = text.strip_prefix(b"-").unwrap_or(text);
+    let is_word = MISSING.iter().any(|known| word.eq_ignore_ascii_case(known));
+    is_dash || is_word || text.contains(&b'#')
 }
 
 /// A unit after its number.
@@ -159,8 +205,8 @@ pub fn shown(cell: &[u8]) -> String {
 pub struct Cell<'a> {
     /// Its text.
     pub text: &'a [u8],
-    /// Whether numbers have decimal commas.
-    pub(super) decimal_commas: bool,
+    /// How its table writes numbers.
+    pub(super) numbers: NumberForm,
 }
 
 /// A converter's code.
@@ -211,21 +257,16 @@ impl Cell<'_> {
         if text.is_empty() {
             return Err(CellFault::Empty);
         }
-        let number = match self.decimal_commas && decimal::is_number(text) {
-            true if text.contains(&b'.') => {
-                return Err(CellFault::DecimalPoint { text: shown(text) });
+        let is_point = self.numbers.decimal_commas && text.contains(&b'.');
+        match self.numbers.number(text) {
+            Some(number) if number.is_finite() => Ok(number),
+            Some(number) if number.is_infinite() => Err(CellFault::Infinite { text: shown(text) }),
+            Some(_) => Err(CellFault::Missing { text: shown(text) }),
+            None if is_missing(text) => Err(CellFault::Missing { text: shown(text) }),
+            None if is_point && decimal::is_number(text) => {
+                Err(CellFault::DecimalPoint { text: shown(text) })
             }
-            true => {
-                let point = |byte: &u8| if *byte == b',' { b'.' } else { *byte };
-                fast_float2::parse(text.iter().map(point).collect::<Vec<u8>>())
-            }
-            false => fast_float2::parse(text),
-        };
-        let number: f64 = number.map_err(|_| CellFault::NotANumber { text: shown(text) })?;
-        match number {
-            _ if number.is_nan() => Err(CellFault::Nan),
-            _ if number.is_infinite() => Err(CellFault::Infinite { text: shown(text) }),
-            _ => Ok(number),
+            None => Err(CellFault::NotANumber { text: shown(text) }),
         }
     }
 
@@ -289,10 +330,10 @@ mod tests {
 
     impl<'a> Cell<'a> {
         /// With decimal points.
-        pub(in crate::log) const fn new(text: &'a str) -> Self {
+        pub(in crate::log) fn new(text: &'a str) -> Self {
             Self {
                 text: text.as_bytes(),
-                decimal_commas: false,
+                numbers: NumberForm::default(),
             }
         }
     }

@@ -158,6 +158,14 @@ pub enum LogProblem {
     #[error(
         "it repeats the quantity of column {first}; name one of the two columns in the [log] table of stage.toml, and put the other into `ignore`"
     )]
+    RepeatedQuantity {
+        /// The other column, from 1.
+        first: usize,
+    },
+    /// Two columns of one name differ.
+    #[error(
+        "it has the name of column {first} and other numbers; give each column a name of its own, and export all signals by one clock"
+    )]
     RepeatedColumn {
         /// The other column, from 1.
         first: usize,
@@ -200,6 +208,14 @@ pub enum LogProblem {
         /// A column of the other set.
         other: String,
     },
+    /// Another table begins.
+    #[error(
+        "another table begins here, with its header in line {header}; write each table to a file of its own, and name all of them"
+    )]
+    OtherTable {
+        /// The line of its header.
+        header: usize,
+    },
     /// A line with more or fewer cells than the header.
     #[error("{found} cells where the header has {expected}; correct or remove the line")]
     CellCount {
@@ -232,6 +248,16 @@ pub enum LogProblem {
         t_us: i64,
     },
     /// A clock starts again.
+    #[error(
+        "the time starts again, from {before_us} us to {t_us} us; add to all later times what the clock lost, or give the rows from here on a movement number of their own"
+    )]
+    ClockRestarts {
+        /// Time of the row above, us.
+        before_us: i64,
+        /// Time of this row, us.
+        t_us: i64,
+    },
+    /// A counter is full.
     #[error(
         "the time falls by 2^{bits} of its units, as a counter of {bits} bits does that is full; add 2^{bits} to all later times, or give the rows from here on a movement number of their own"
     )]

@@ -95,7 +95,7 @@ impl<'a> Header<'a> {
     /// that is known by other words. Columns without a name, a meaning or a unit of their quantity are unknown.
     ///
     /// # Errors
-    /// `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`, `UnitsDisagree`.
+    /// `RepeatedQuantity`, `NoUnit`, `NoVoltsPerCount`, `UnitsDisagree`.
     pub fn new(table: &'a Head, layout: &'a LogLayout) -> Result<Self, LogError> {
         let mut header = Self {
             table,
@@ -108,16 +108,26 @@ impl<'a> Header<'a> {
             for (cell, name) in table.names.iter().enumerate() {
                 let refuse = |problem| Err(table.place(table.line, cell, None).refuse(problem));
                 let meaning = layout.meaning(name);
-                if matches!(meaning, Meaning::Exact(_)) != is_exact || meaning == Meaning::Ignored {
+                let is_copy = table.copies.iter().any(|(copy, _)| *copy == cell);
+                let is_later = matches!(meaning, Meaning::Exact(_)) != is_exact;
+                if is_later || is_copy || meaning == Meaning::Ignored {
                     continue;
                 }
                 let (quantity, scale) = match header.source(cell, name, meaning) {
                     Ok(Some(found)) if exact[found.0 as usize].is_none() => found,
                     Ok(_) => {
-                        header.unknown.push(match name.as_str() {
-                            "" => format!("column {} without a name", cell + 1),
+                        let end = if cell + 1 == table.names.len() {
+                            " (the header ends with a separator)"
+                        } else {
+                            ""
+                        };
+                        let name = match name.as_str() {
+                            "" => format!("column {} without a name{end}", cell + 1),
                             name => shown(name.as_bytes()),
-                        });
+                        };
+                        if !header.unknown.contains(&name) {
+                            header.unknown.push(name);
+                        }
                         continue;
                     }
                     Err(problem) => return refuse(problem),
@@ -125,7 +135,7 @@ impl<'a> Header<'a> {
                 let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
                 if let Some(first) = earlier {
                     let first = first.cell + 1;
-                    return refuse(LogProblem::RepeatedColumn { first });
+                    return refuse(LogProblem::RepeatedQuantity { first });
                 }
             }
             exact = header.sources;

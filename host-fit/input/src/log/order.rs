@@ -5,6 +5,7 @@
 //! missing for more than ten of the log's own periods (its median step).
 
 use super::error::{LogError, LogProblem, Place};
+use super::header::Source;
 use super::table::Head;
 use std::collections::HashMap;
 
@@ -18,11 +19,14 @@ pub(super) const GAP_PERIODS: f64 = 10.0;
 /// Fewest rows before the time may start again; after fewer rows the log is out of order.
 const ROWS_MIN: usize = 10;
 
+/// Bits of the counters of clocks.
+const COUNTER_BITS: [i32; 3] = [16, 24, 32];
+
 /// The cells with the time and the movement.
 #[derive(Clone, Copy, Debug)]
 pub struct OrderCells {
     /// The time.
-    pub time: usize,
+    pub time: Source,
     /// The movement, if there is a column for it.
     pub movement: Option<usize>,
 }
@@ -90,7 +94,7 @@ impl Order {
     /// time, us.
     ///
     /// # Errors
-    /// `TimeBackwards`, `DuplicatedRow`, `MovementReturns`, `TooManyMovements`.
+    /// `TimeBackwards`, `ClockWraps`, `ClockRestarts`, `DuplicatedRow`, `MovementReturns`, `TooManyMovements`.
     pub fn take(
         &mut self,
         head: &Head,
@@ -103,14 +107,23 @@ impl Order {
         let restarts = named.is_none() && rows >= ROWS_MIN && t_us <= first_us;
         match self.current {
             Some((current, before_us)) if current == named && !restarts => {
+                let time = self.cells.time.cell;
                 if t_us < before_us {
+                    let bits = self.counter_bits(before_us - t_us);
+                    let is_start = rows >= ROWS_MIN && (0.0..=first_us).contains(&t_us);
                     let (before_us, t_us) = (before_us.round() as i64, t_us.round() as i64);
-                    let problem = LogProblem::TimeBackwards { before_us, t_us };
-                    return refuse(self.cells.time, problem);
+                    return refuse(
+                        time,
+                        match bits {
+                            Some(bits) => LogProblem::ClockWraps { bits },
+                            None if is_start => LogProblem::ClockRestarts { before_us, t_us },
+                            None => LogProblem::TimeBackwards { before_us, t_us },
+                        },
+                    );
                 }
                 if t_us == before_us {
                     let t_us = t_us.round() as i64;
-                    return refuse(self.cells.time, LogProblem::DuplicatedRow { t_us });
+                    return refuse(time, LogProblem::DuplicatedRow { t_us });
                 }
                 let is_gap = t_us - before_us > GAP_PERIODS * self.period_us;
                 self.begins |= named.is_none() && is_gap;
@@ -134,6 +147,20 @@ impl Order {
         }
         self.current = Some((named, t_us));
         Ok(())
+    }
+
+    /// The header stands again above the next row: its time may start again, too.
+    pub fn begin_anew(&mut self) {
+        if let Some((_, before_us)) = self.current {
+            self.started = (before_us, ROWS_MIN);
+        }
+    }
+
+    /// The bits of a counter that is full at this step back in time.
+    fn counter_bits(&self, fall_us: f64) -> Option<i32> {
+        let off = |bits: &i32| (fall_us - 2f64.powi(*bits) * self.cells.time.scale).abs();
+        let mut bits = COUNTER_BITS.into_iter();
+        bits.find(|bits| off(bits) <= 2.0 * self.period_us)
     }
 
     /// Keeps the row in hand.

@@ -1,17 +1,18 @@
 //! Faults of many rows: no single row is to blame, and the message names the pattern.
 
 use super::cell::CellFault;
-use super::error::{LogError, LogProblem};
+use super::error::{LogError, LogProblem, Place};
 use super::stream::LogRows;
+use std::collections::BTreeSet;
 use std::mem::discriminant;
 
 /// Most rows that are read on after the first fault.
 const ROWS_MAX: usize = 100_000;
+/// Fewest bits that are always 0 below left-justified codes.
+const SPARE_BITS: u32 = 4;
 /// Fewest rows with the same fault, and one over their smallest share, that make a pattern.
 const ROWS_MIN: usize = 10;
 const ONE_IN: usize = 20;
-/// Bits of the counters of clocks.
-const COUNTER_BITS: [i32; 3] = [16, 24, 32];
 
 /// What is wrong with a column of a log, or with all of its rows.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -39,6 +40,14 @@ pub enum Pattern {
     OffsetBinary {
         /// The largest code of the converter.
         code_max: i32,
+    },
+    /// Codes stand at the left end of a longer word.
+    #[error(
+        "the codes are left-justified: their lowest {bits} bits are always 0; divide them by 2^{bits}"
+    )]
+    LeftJustified {
+        /// Bits below the codes.
+        bits: u32,
     },
     /// Other codes than the converter's.
     #[error(
@@ -68,6 +77,15 @@ pub enum Pattern {
         "the numbers are too large; correct the unit or the scale of the column in the [log] table of stage.toml"
     )]
     TooLarge,
+    /// One number that is too large.
+    #[error("{value:e} stands for a missing value, it seems; skip such rows with --bad-rows skip")]
+    Sentinel {
+        /// The number.
+        value: f64,
+    },
+    /// A fault of some cells.
+    #[error("{0}; or skip all such rows with --bad-rows skip")]
+    Scattered(CellFault),
     /// Codes at a rail.
     #[error(
         "codes are at the converter's rail; check the sensor, its cable and the range of the converter, and record the log again"
@@ -75,7 +93,7 @@ pub enum Pattern {
     Saturated,
     /// Other numbers of cells than the header.
     #[error(
-        "the rows have {found} cells and the header {expected}; if the numbers have decimal commas, separate the cells by semicolons or tabs"
+        "the rows have {found} cells and the header {expected}; if the numbers have decimal commas, separate the cells by semicolons or tabs, and if white space separates the cells, put names with spaces into quotation marks"
     )]
     CellCount {
         /// Cells of the header.
@@ -86,19 +104,18 @@ pub enum Pattern {
 }
 
 impl LogRows<'_> {
-    /// The error of a log, named by its pattern where many rows have the same fault; reads on to count them.
+    /// The error of a log, named by its pattern where several rows have the same fault; reads on to count them.
     pub(super) fn named_by_pattern(&mut self, error: LogError) -> LogError {
-        if let LogProblem::TimeBackwards { before_us, t_us } = error.problem {
-            let wraps = self.counter_bits((before_us - t_us) as f64);
-            let problem = wraps.map(|bits| LogProblem::ClockWraps { bits });
-            return error.place.refuse(problem.unwrap_or(error.problem));
+        let is_text = match &error.problem {
+            LogProblem::Cell(fault) => fault.is_text(),
+            LogProblem::DuplicatedRow { .. } | LogProblem::CellCount { .. } => false,
+            _ => return error,
+        };
+        if is_text && let Ok(Some(header)) = self.table.other_table() {
+            let place = Place::new(&self.table.head.path, self.table.row_line());
+            return place.refuse(LogProblem::OtherTable { header });
         }
-        if !matches!(
-            error.problem,
-            LogProblem::Cell(_) | LogProblem::DuplicatedRow { .. } | LogProblem::CellCount { .. }
-        ) {
-            return error;
-        }
+        let time = self.reader.columns.time.cell;
         let column = error.place.column.as_ref().map(|(column, _)| column - 1);
         let (mut rows, mut faults) = (1, 1);
         let mut before_us = f64::NAN;
@@ -122,11 +139,17 @@ impl LogRows<'_> {
                 Err(LogError { problem, .. }) => Some((usize::MAX, problem)),
             };
             rows += 1;
+            let number = column.map(|cell| (cell, self.table.row.cell(cell).number()));
+            // Another cell of the row may have a fault, too.
+            let found = match number.clone() {
+                Some((cell, Err(fault))) if is_text && cell != time => Some((cell, fault.into())),
+                _ => found,
+            };
             let is_same = |(cell, problem): (usize, LogProblem)| {
                 cell == column.unwrap_or(usize::MAX) && problem.is_like(&error.problem)
             };
             faults += usize::from(found.is_some_and(is_same));
-            numbers.extend(column.and_then(|cell| self.table.row.cell(cell).number().ok()));
+            numbers.extend(number.and_then(|(_, number)| number.ok()));
         }
         let pattern = match &error.problem {
             LogProblem::DuplicatedRow { .. } => Some(Pattern::CoarseTimes),
@@ -134,28 +157,24 @@ impl LogRows<'_> {
                 let (expected, found) = (*expected, *found);
                 Some(Pattern::CellCount { expected, found })
             }
-            LogProblem::Cell(fault) => Pattern::of_cells(fault, &numbers),
+            LogProblem::Cell(fault) => Pattern::of_cells(fault, &numbers, faults),
+            _ => None,
+        };
+        let is_usual = faults >= ROWS_MIN && faults * ONE_IN >= rows;
+        let pattern = match &error.problem {
+            _ if is_usual => pattern,
+            LogProblem::Cell(CellFault::Saturated { .. }) => None,
+            LogProblem::Cell(fault) if faults > 1 => Some(Pattern::Scattered(fault.clone())),
             _ => None,
         };
         match pattern {
-            Some(pattern) if faults >= ROWS_MIN && faults * ONE_IN >= rows => {
-                error.place.refuse(LogProblem::Pattern {
-                    faults,
-                    rows,
-                    pattern,
-                })
-            }
-            _ => error,
+            Some(pattern) => error.place.refuse(LogProblem::Pattern {
+                faults,
+                rows,
+                pattern,
+            }),
+            None => error,
         }
-    }
-
-    /// The bits of a counter that is full at this step back in time.
-    fn counter_bits(&self, fall_us: f64) -> Option<i32> {
-        let unit_us = self.reader.columns.time.scale;
-        let off = |bits: &i32| (fall_us - 2f64.powi(*bits) * unit_us).abs();
-        COUNTER_BITS
-            .into_iter()
-            .find(|bits| off(bits) <= 2.0 * self.order.period_us)
     }
 }
 
@@ -173,20 +192,29 @@ impl LogProblem {
 
 impl Pattern {
     /// Of a column with this fault in many cells and these numbers in the others.
-    fn of_cells(fault: &CellFault, numbers: &[f64]) -> Option<Self> {
+    fn of_cells(fault: &CellFault, numbers: &[f64], faults: usize) -> Option<Self> {
         Some(match fault {
-            CellFault::Empty | CellFault::Nan => Self::Empty,
+            CellFault::Empty | CellFault::Missing { .. } => Self::Empty,
             CellFault::NotANumber { text } | CellFault::DecimalPoint { text } => {
                 Self::NotNumbers { text: text.clone() }
             }
             CellFault::NotWhole { .. } => Self::NotCodes,
-            CellFault::Absurd { .. } => Self::TooLarge,
+            CellFault::Absurd { .. } => {
+                let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+                let value = numbers.iter().copied().max_by(by_size).unwrap_or_default();
+                // The first is not among the numbers.
+                match numbers.iter().filter(|number| **number == value).count() + 1 == faults {
+                    true => Self::Sentinel { value },
+                    false => Self::TooLarge,
+                }
+            }
             CellFault::Saturated { code } => match numbers.iter().any(|n| *n > f64::from(*code)) {
                 true => Self::of_codes(numbers, *code),
                 false => Self::Saturated,
             },
             CellFault::OutsideConverter { code_max, .. } => Self::of_codes(numbers, *code_max),
             CellFault::Infinite { .. }
+            | CellFault::Temperature { .. }
             | CellFault::NotATime { .. }
             | CellFault::OtherTime { .. } => return None,
         })
@@ -195,6 +223,13 @@ impl Pattern {
     /// Of codes that this converter cannot give: a sound log crosses zero in small steps.
     fn of_codes(codes: &[f64], code_max: i32) -> Self {
         let half = f64::from(code_max) + 1.0;
+        let other: BTreeSet<i64> = codes.iter().map(|code| *code as i64).collect();
+        let bits = other.iter().map(|code| code.trailing_zeros()).min();
+        let bits = bits.unwrap_or_default();
+        let shifted = |code: &i64| (*code as f64 / 2f64.powi(bits as i32)).abs() <= 2.0 * half;
+        if bits >= SPARE_BITS && other.len() >= ROWS_MIN && other.iter().all(shifted) {
+            return Self::LeftJustified { bits };
+        }
         let are_unsigned = codes.iter().all(|code| (0.0..2.0 * half).contains(code));
         if code_max <= 0 || !are_unsigned {
             return Self::OtherCodes;

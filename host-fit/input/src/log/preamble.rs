@@ -4,12 +4,13 @@
 //! there are. The header is the last line of distinct names above the rows.
 
 use super::cell::shown;
+use super::decimal::NumberForm;
 use super::error::{LogError, LogProblem, Place};
 use super::lines::{TextLine, lines_of};
-use super::record::{Dialect, Record};
+use super::record::{Record, WHITE_SPACE};
 use super::table::COLUMNS_MAX;
-use super::time::is_time;
-use super::{decimal, units};
+use super::units;
+use super::words::{are_names, are_numbers, columns, is_word, names};
 use crate::other_format;
 use crate::source::SourceProblem;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,10 +19,10 @@ use std::path::Path;
 /// Starts a comment, as the first byte of a line.
 pub(super) const COMMENT: u8 = b'#';
 
-/// What may separate cells; the first of them where two do as well.
-const SEPARATORS: [u8; 3] = [b'\t', b';', b','];
+/// What may separate cells; the first of them where two do as well. White space does where none of them does.
+const SEPARATORS: [u8; 4] = [b'\t', b';', b',', b'|'];
 
-/// Number of lines that decide the form of a table, without comments and blank lines.
+/// Number of lines that decide the form of a table, without comments and blank lines: those about its header.
 const LINES_MAX: usize = 1000;
 
 /// Fewest different known names of columns that make a header by themselves.
@@ -75,37 +76,60 @@ impl Preamble {
         let written = lines_of(bytes).filter(|line| !line.text.trim_ascii().is_empty());
         let (notes, plain): (Vec<_>, Vec<_>) =
             written.partition(|line| line.text.first() == Some(&COMMENT));
-        let plain = plain.get(..LINES_MAX).unwrap_or(&plain);
-        let separator = separator(plain);
-        let mut record = Record::new(Dialect {
-            separator,
-            decimal_commas: false,
-        });
-        let mut apart = |line| Line::new(line, &mut record);
-        let lines: Vec<Line> = plain.iter().map(&mut apart).collect();
-        let notes = notes.iter().map(apart);
-        let (first, cells) = rows(&lines);
-        let first_row = lines.get(first);
-        let is_above = |line: &Line| first_row.is_none_or(|row| line.line < row.line);
+        let separator = separator(plain.get(..LINES_MAX).unwrap_or(&plain));
+        let mut record = Record::new(separator, NumberForm::default());
+        let mut apart = |line: &TextLine<'_>| Line::new(line, &mut record);
         let is_header = |line: &Line| {
-            let known: BTreeSet<&String> = line.names.iter().filter(|n| is_known(n)).collect();
+            let words = line.names.iter().filter(|name| is_word(name));
+            let known: BTreeSet<&String> = words.filter(|name| is_known(name)).collect();
             known.len() >= KNOWN_MIN
         };
-        let by_name = lines.iter().find(|line| is_header(line)).cloned();
+        let by_name = plain.iter().position(|line| is_header(&apart(line)));
+        let above = by_name.map_or(0, |header| header.saturating_sub(LINES_MAX / 2));
+        let about = plain.get(above..).unwrap_or_default();
+        let about = about.get(..LINES_MAX).unwrap_or(about);
+        let lines: Vec<Line> = about.iter().map(&mut apart).collect();
+        let notes = notes.iter().map(apart);
+        let by_name = by_name.map(|header| header - above);
+        // A table of numbers above the header may be longer.
+        let below = by_name.map_or(0, |header| header + 1);
+        let (first, cells) = rows(lines.get(below..).unwrap_or_default());
+        let first = below + first;
+        let first_row = lines.get(first);
+        let is_above = |line: &Line| first_row.is_none_or(|row| line.line < row.line);
+        let by_name = by_name.and_then(|header| lines.get(header)).cloned();
         let in_note = || {
             notes
                 .filter(|note| is_above(note) && is_header(note))
                 .last()
         };
+        let format = plain
+            .first()
+            .and_then(|line| other_format::in_text(line.text));
         let by_place = || match first_row {
-            None => lines.first(),
+            None => lines.first().filter(|_| format.is_none()),
             Some(_) => lines.iter().take(first).rfind(|line| line.has_names(cells)),
         };
         let header = by_name.or_else(in_note).or_else(|| by_place().cloned());
+        let in_columns = |mut header: Line| {
+            let is_other = header.names.len() != cells && first_row.is_some();
+            if separator == WHITE_SPACE
+                && is_other
+                && let Some(line) = plain.iter().find(|line| line.line == header.line)
+            {
+                header.names = columns(line.text);
+                header.names.truncate(if header.names.len() == cells {
+                    cells
+                } else {
+                    1
+                });
+            }
+            header
+        };
+        let header = header.map(in_columns);
         let header = header.ok_or(LogProblem::NoHeader).and_then(Line::checked);
         let header = header.map_err(|problem| {
             let first = plain.first();
-            let format = first.and_then(|line| other_format::in_text(line.text));
             let problem = match format {
                 _ if first.is_none() => LogProblem::Empty,
                 Some(looks_like) => SourceProblem::OtherFormat { looks_like }.into(),
@@ -123,7 +147,8 @@ impl Preamble {
             .iter()
             .position(|line| line.line > header.line && !is_fact(line));
         let passed = lines.get(..row.unwrap_or(lines.len())).unwrap_or_default();
-        let units = passed.iter().rfind(|line| line.is_units());
+        let is_wide = |line: &&Line| line.names.len() + 1 >= cells;
+        let units = passed.iter().filter(is_wide).rfind(|line| line.is_units());
         let last = passed
             .last()
             .filter(|last| last.line > header.line)
@@ -143,12 +168,10 @@ impl Preamble {
 impl Line {
     fn new(line: &TextLine<'_>, record: &mut Record) -> Self {
         record.split(line.text.strip_prefix(&[COMMENT]).unwrap_or(line.text));
-        // One column too many is enough to refuse it.
-        let cells = record.cells().take(COLUMNS_MAX + 1);
         Self {
             line: line.line,
             end: line.end,
-            names: cells.map(|cell| text(cell.text)).collect(),
+            names: names(record),
         }
     }
 
@@ -165,25 +188,9 @@ impl Line {
         }
     }
 
-    /// Whether it is more than half numbers and times, and has at least two.
-    fn is_row(&self) -> bool {
-        let is_number =
-            |cell: &&String| decimal::is_number(cell.as_bytes()) || is_time(cell.as_bytes());
-        let numbers = self.names.iter().filter(is_number).count();
-        numbers >= 2 && 2 * numbers > self.names.len()
-    }
-
-    /// Whether it has distinct words, for at least half of the usual cells.
+    /// Whether it may be a header of rows with this usual number of cells.
     fn has_names(&self, cells: usize) -> bool {
-        let mut names: Vec<&String> = self.names.iter().filter(|name| !name.is_empty()).collect();
-        let count = names.len();
-        names.sort_unstable();
-        names.dedup();
-        names.len() == count
-            && count >= 2
-            && 2 * count >= cells
-            && names.into_iter().all(is_word)
-            && !self.is_units()
+        are_names(&self.names, cells) && !self.is_units()
     }
 
     /// Whether it holds the units of columns: no number, at least two units, and nothing as long as a remark.
@@ -197,19 +204,15 @@ impl Line {
     }
 }
 
-/// Whether a cell is neither empty nor a number or a time.
-fn is_word(cell: &String) -> bool {
-    let cell = cell.as_bytes();
-    !cell.is_empty() && !decimal::is_number(cell) && !is_time(cell)
-}
-
 /// What separates the cells: most lines agree on their number.
 fn separator(lines: &[TextLine<'_>]) -> u8 {
     // The number of lines that agree, and of separators in each.
     let agree = |separator: &u8| {
         let mut lines_of: BTreeMap<usize, usize> = BTreeMap::new();
         for line in lines {
-            let count = line.text.iter().filter(|byte| *byte == separator).count();
+            let text = line.text.trim_ascii_start();
+            let runs = text.chunk_by(|a, b| a == b && *a == WHITE_SPACE);
+            let count = runs.filter(|run| run[0] == *separator).count();
             *lines_of.entry(count).or_default() += usize::from(count > 0);
         }
         let most = lines_of.into_iter().map(|(count, lines)| (lines, count));
@@ -222,7 +225,13 @@ fn separator(lines: &[TextLine<'_>]) -> u8 {
             one
         }
     };
-    SEPARATORS.into_iter().reduce(best).unwrap_or(b',')
+    let found = SEPARATORS.into_iter().reduce(best).unwrap_or(b',');
+    let (agreed, _) = agree(&found);
+    if 2 * agreed < lines.len() && agree(&WHITE_SPACE).0 > agreed {
+        WHITE_SPACE
+    } else {
+        found
+    }
 }
 
 /// The first of the rows, which are the longest run of rows (the last of equal ones), and their usual number of
@@ -230,8 +239,9 @@ fn separator(lines: &[TextLine<'_>]) -> u8 {
 fn rows(lines: &[Line]) -> (usize, usize) {
     let mut run = lines.len()..lines.len();
     let mut at = 0;
-    for same in lines.chunk_by(|one, other| one.is_row() == other.is_row()) {
-        if same[0].is_row() && same.len() >= run.len() {
+    let is_row = |line: &Line| are_numbers(&line.names);
+    for same in lines.chunk_by(|one, other| is_row(one) == is_row(other)) {
+        if is_row(&same[0]) && same.len() >= run.len() {
             run = at..at + same.len();
         }
         at += same.len();
@@ -242,16 +252,6 @@ fn rows(lines: &[Line]) -> (usize, usize) {
     }
     let usual = rows_of.into_iter().max_by_key(|(_, rows)| *rows);
     (run.start, usual.map_or(0, |(cells, _)| cells))
-}
-
-/// A cell's text without white space around it. Other text than UTF-8 is Latin-1: older programs write the micro
-/// sign in it.
-pub(super) fn text(cell: &[u8]) -> String {
-    let cell = cell.trim_ascii();
-    match core::str::from_utf8(cell) {
-        Ok(text) => text.trim().to_owned(),
-        Err(_) => cell.iter().map(|byte| char::from(*byte)).collect(),
-    }
 }
 
 #[cfg(test)]
@@ -280,12 +280,21 @@ mod tests {
             let found = read(text);
             assert_eq!((found.line, &found.names), (line, &names), "{text:?}");
         }
+        let numbers: String = (0..1500).map(|k| format!("{k},0.5\n")).collect();
+        let below = read(&format!("p,q\n{numbers}a,b,c\n1,2,3\n4,5,6\n"));
+        assert_eq!((below.line, below.cells), (1502, 3));
+        for text in ["a b c\n1 2 3\n4  5  6\n", "a|b|c\n1|2|3\n"] {
+            assert_eq!(read(text).names, names, "{text}");
+        }
+        let spaced = read("a (s)  b 1   c\n1 2 3\n4 5 6\n").names;
+        assert_eq!(spaced, ["a (s)", "b 1", "c"]);
         // Without known names: the last line of distinct names above the rows, or the first line that is no comment.
         for (text, line) in [
             ("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3", 3),
             ("note\n\n# note\nx,y,z\n2026-01-02T03:04:05,2,3", 4),
             ("# note\n\nx,y\n1,2", 3),
             ("x,y,z\nleft,right,left\n1,2,3", 1),
+            ("t,x,t,y\n1,2,1,3\n4,5,4,6", 1),
             ("operator,lab\nx,y,z\n1,2,3\n4,5,6", 2),
             ("# note\nx,y", 2),
         ] {
@@ -296,7 +305,11 @@ mod tests {
             read.map(|_| ()).expect_err(text).problem
         };
         assert!(matches!(problem("1,2\n3,4"), LogProblem::NoHeader));
+        let narrow = problem("a (s) b 1 c\n1 2 3\n4 5 6\n");
+        assert!(matches!(narrow, LogProblem::NoSeparator { .. }), "{narrow}");
         assert!(matches!(problem("\n# a\n"), LogProblem::Empty));
+        let json = problem("{\"a\": 1, \"b\": 2}\n{\"a\": 1, \"b\": 2}\n");
+        assert!(matches!(json, LogProblem::Source(_)), "{json}");
     }
 
     #[test]

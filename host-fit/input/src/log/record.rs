@@ -5,19 +5,16 @@
 //! line, as a ditto mark, is text.
 
 use super::cell::Cell;
+use super::decimal::NumberForm;
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 
-/// How the cells of a table are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Dialect {
-    pub(super) separator: u8,
-    /// Whether numbers have decimal commas.
-    pub(super) decimal_commas: bool,
-}
+/// White space of any length separates cells.
+pub(super) const WHITE_SPACE: u8 = b' ';
 
 /// The cells of the line in hand.
 pub(super) struct Record {
-    decimal_commas: bool,
+    pub(super) separator: u8,
+    numbers: NumberForm,
     /// The second one takes quotation marks as text.
     readers: [Reader; 2],
     text: Vec<u8>,
@@ -28,11 +25,12 @@ pub(super) struct Record {
 
 impl Record {
     /// Of a table, without a line.
-    pub(super) fn new(dialect: Dialect) -> Self {
+    pub(super) fn new(separator: u8, numbers: NumberForm) -> Self {
         let mut builder = ReaderBuilder::new();
-        builder.delimiter(dialect.separator);
+        builder.delimiter(separator);
         Self {
-            decimal_commas: dialect.decimal_commas,
+            separator,
+            numbers,
             readers: [builder.build(), builder.quoting(false).build()],
             text: Vec::new(),
             ends: vec![0; 16],
@@ -42,6 +40,17 @@ impl Record {
 
     /// Takes a line without its break in hand.
     pub(super) fn split(&mut self, line: &[u8]) {
+        if self.separator == WHITE_SPACE {
+            let mut words = line.to_vec();
+            words.dedup_by(|next, before| *next == WHITE_SPACE && *before == WHITE_SPACE);
+            self.split_at_each(words.trim_ascii());
+        } else {
+            self.split_at_each(line);
+        }
+    }
+
+    /// Takes a line apart at each separator.
+    fn split_at_each(&mut self, line: &[u8]) {
         if !self.fill(line, 0) {
             self.fill(line, 1);
         }
@@ -89,7 +98,7 @@ impl Record {
         };
         Cell {
             text: text.unwrap_or_default(),
-            decimal_commas: self.decimal_commas,
+            numbers: self.numbers,
         }
     }
 
@@ -105,10 +114,7 @@ mod tests {
 
     #[test]
     fn cells_may_be_quoted_and_a_mark_that_is_not_closed_is_text() {
-        let mut record = Record::new(Dialect {
-            separator: b',',
-            decimal_commas: false,
-        });
+        let mut record = Record::new(b',', NumberForm::default());
         for (text, want) in [
             ("a,b", &["a", "b"][..]),
             (",", &["", ""]),
@@ -130,5 +136,9 @@ mod tests {
         let many = ",".repeat(1000);
         record.split(many.as_bytes());
         assert_eq!(record.len(), 1001);
+        let mut spaced = Record::new(WHITE_SPACE, NumberForm::default());
+        spaced.split(b"  1  -2   \"a b\" ");
+        let cells: Vec<&[u8]> = spaced.cells().map(|cell| cell.text).collect();
+        assert_eq!(cells, [&b"1"[..], b"-2", b"a b"]);
     }
 }

@@ -16,6 +16,8 @@ use runtime::{RawFrame, VerticalPose};
 pub const ROTATION_MAX_RAD: f64 = 0.1;
 /// Largest sensible temperature, m degC. Kelvin taken for degrees Celsius are beyond it.
 const TEMPERATURE_MAX_MC: f64 = 2e5;
+/// Larger numbers are no kelvin, either, m degC.
+const KELVIN_MAX_MC: f64 = 1e6;
 /// Largest sensible displacement, in full scales of its sensor: no useful sensor has a quarter of its designed
 /// sensitivity.
 const FULL_SCALES: f64 = 4.0;
@@ -163,9 +165,22 @@ impl<'a> RowReader<'a> {
     fn temperature_mc(&self, row: &Record, source: Option<Source>) -> Result<i32, BadCell> {
         let there = source.filter(|source| !row.cell(source.cell).text.trim_ascii().is_empty());
         there.map_or(Ok(MISSING_CODE), |source| {
-            let limit = TEMPERATURE_MAX_MC + self.zero_mc.abs();
-            let above_zero = scaled(row, source, limit, "m degC")?;
-            Ok((above_zero + self.zero_mc).round() as i32)
+            let above_zero = scaled(row, source, f64::MAX, "m degC")?;
+            let temperature_mc = above_zero + self.zero_mc;
+            match temperature_mc.abs() <= TEMPERATURE_MAX_MC {
+                true => Ok(temperature_mc.round() as i32),
+                false => Err(BadCell {
+                    cell: source.cell,
+                    fault: CellFault::Temperature {
+                        celsius: temperature_mc * 1e-3,
+                        unit: if temperature_mc < KELVIN_MAX_MC {
+                            "K"
+                        } else {
+                            "mC"
+                        },
+                    },
+                }),
+            }
         })
     }
 

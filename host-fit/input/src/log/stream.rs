@@ -82,7 +82,7 @@ impl<'a> LogRows<'a> {
         let servo_us = stage.servo_period_s * 1e6;
         let period_us = table.period_us(columns.time, columns.movement)?;
         let cells = OrderCells {
-            time: columns.time.cell,
+            time: columns.time,
             movement: columns.movement.map(|source| source.cell),
         };
         let keep_saturated = options.saturated == SaturatedCodes::Keep;
@@ -115,6 +115,9 @@ impl<'a> LogRows<'a> {
 
     fn row(&mut self) -> Result<Option<LogRow>, LogError> {
         while self.table.next_row()? {
+            if self.table.begins_anew {
+                self.order.begin_anew();
+            }
             let (cells, line) = (&self.table.row, self.table.lines.line);
             let movement = self.reader.movement(cells);
             let known = movement.as_ref().map_or(None, |movement| *movement);

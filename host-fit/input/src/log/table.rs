@@ -4,14 +4,15 @@
 //! possible. [`super::header`] decides which columns are needed.
 
 use super::cell::{Cell, shown};
-use super::decimal;
+use super::decimal::NumberForm;
 use super::error::{LogError, LogProblem, Place};
 use super::header::Source;
-use super::lines::{Lines, lines_of};
+use super::lines::{Lines, TextLine, lines_of};
 use super::preamble::{COMMENT, Preamble};
-use super::record::{Dialect, Record};
+use super::record::Record;
 use super::time::{Clock, is_time};
 use super::units;
+use super::words;
 use crate::statistics::median;
 use crate::text::TextReader;
 use crate::watch::Watch;
@@ -35,6 +36,10 @@ pub struct Head {
     times: Vec<bool>,
     /// Fewest cells of a row.
     cells_min: usize,
+    /// Columns with the name of an earlier column, both from 0: their cells are the same.
+    pub(super) copies: Vec<(usize, usize)>,
+    /// The header and the lines between it and the rows, as they are written, without blank ones.
+    lines: Vec<Vec<u8>>,
 }
 
 impl Head {
@@ -65,9 +70,12 @@ impl Head {
     }
 }
 
-/// Whether a line is neither blank nor a comment.
+/// Most lines above the header of another table in the same file.
+const HEAD_LINES: usize = 100;
+
+/// Whether a line is neither blank nor a comment. `#N/A` is a missing value.
 fn is_row(line: &[u8], separator: u8) -> bool {
-    line.first() != Some(&COMMENT)
+    (line.first() != Some(&COMMENT) || line.starts_with(b"#N/A"))
         && (!line.iter().all(u8::is_ascii_whitespace) || line.contains(&separator))
 }
 
@@ -78,7 +86,8 @@ pub struct Table<'a> {
     pub(super) lines: Lines<'a>,
     /// The row in hand.
     pub(super) row: Record,
-    separator: u8,
+    /// Whether the header stands again above the row in hand.
+    pub(super) begins_anew: bool,
     /// The line of the last row, if no line break follows it.
     pub(super) open_line: Option<usize>,
 }
@@ -102,20 +111,30 @@ impl<'a> Table<'a> {
             above,
             end,
             separator,
-            names,
+            mut names,
             units,
             cells,
         } = Preamble::read(opening, &path, &is_known)?;
         let rows = opening.get(end..).unwrap_or_default();
-        let mut row = Record::new(Dialect {
-            separator,
-            decimal_commas: decimal::has_decimal_commas(rows, separator),
-        });
+        let mut row = Record::new(separator, NumberForm::new(rows, separator));
+        let written = lines_of(opening).filter(|text| (line..=above).contains(&text.line));
+        let written = written.filter(|line| !line.text.trim_ascii().is_empty());
+        let written = written.map(|line| line.text.to_vec()).collect();
         let mut times = Vec::new();
         if let Some(first) = lines_of(rows).find(|line| is_row(line.text, separator)) {
             row.split(first.text);
             times = row.cells().map(|cell| is_time(cell.text)).collect();
         }
+        // The index of a data frame.
+        if let (Some(name), Some(true)) = (names.first_mut(), times.first())
+            && name.is_empty()
+        {
+            "time".clone_into(name);
+        }
+        let first = |name: &String| names.iter().position(|earlier| earlier == name);
+        let named = names.iter().enumerate().filter(|(_, name)| is_known(name));
+        let copies = named.filter_map(|(cell, name)| Some((cell, first(name)?)));
+        let copies = copies.filter(|(cell, first)| first < cell).collect();
         while lines.line < above && lines.next_line()?.is_some() {}
         let known = names.iter().rposition(|name| is_known(name));
         let head = Head {
@@ -125,12 +144,14 @@ impl<'a> Table<'a> {
             names,
             units,
             times,
+            copies,
+            lines: written,
         };
         Ok(Self {
             head,
             lines,
             row,
-            separator,
+            begins_anew: false,
             open_line: None,
         })
     }
@@ -153,7 +174,8 @@ impl<'a> Table<'a> {
         movement: Option<Source>,
     ) -> Result<Option<f64>, LogError> {
         let (mut clock, mut before, mut steps) = (Clock::default(), None, Vec::new());
-        for line in lines_of(self.lines.opening()?).filter(|l| is_row(l.text, self.separator)) {
+        let separator = self.row.separator;
+        for line in lines_of(self.lines.opening()?).filter(|l| is_row(l.text, separator)) {
             self.row.split(line.text);
             let movement = movement.map(|source| self.row.cell(source.cell).text.to_vec());
             if let Ok(t_us) = clock.t_us(self.row.cell(time.cell), time.scale) {
@@ -169,17 +191,20 @@ impl<'a> Table<'a> {
         Ok(median(&mut steps))
     }
 
-    /// Takes the next row in hand; `false` at the end.
+    /// Takes the next row in hand; `false` at the end. A header that stands again is passed over.
     ///
     /// # Errors
-    /// Errors of reading, `LineTooLong`, `CellCount`, `CutLine`.
+    /// Errors of reading, `LineTooLong`, `CellCount`, `CutLine`, `OtherTable`, `RepeatedColumn`.
     pub fn next_row(&mut self) -> Result<bool, LogError> {
         let expected = self.head.cells_min;
+        self.begins_anew = false;
         loop {
             let Some(line) = self.lines.next_line()? else {
                 return Ok(false);
             };
-            if is_row(line, self.separator) {
+            if self.head.lines.iter().any(|written| written == line) {
+                self.begins_anew = true;
+            } else if is_row(line, self.row.separator) {
                 self.row.split(line);
                 break;
             }
@@ -194,14 +219,48 @@ impl<'a> Table<'a> {
                 return refuse(LogProblem::CutLine { expected, found });
             }
         }
-        let mut beyond = self.row.cells().skip(self.head.names.len());
-        match found >= expected && beyond.all(|cell| cell.text.trim_ascii().is_empty()) {
-            true => Ok(true),
-            false => refuse(LogProblem::CellCount {
-                expected: self.head.names.len(),
-                found,
-            }),
+        let names = self.head.names.len();
+        let is_empty = |cell: usize| self.row.cell(cell).text.trim_ascii().is_empty();
+        if found < expected || !(names..found).all(is_empty) {
+            let problem = match self.other_table()? {
+                Some(header) => LogProblem::OtherTable { header },
+                None => LogProblem::CellCount {
+                    expected: names,
+                    found,
+                },
+            };
+            return Err(Place::new(&self.head.path, line).refuse(problem));
         }
+        let differs = |(cell, first): &&(usize, usize)| {
+            self.row.cell(*cell).text != self.row.cell(*first).text
+        };
+        match self.head.copies.iter().find(differs) {
+            Some((cell, first)) => {
+                let problem = LogProblem::RepeatedColumn { first: first + 1 };
+                Err(self.head.place(line, *cell, None).refuse(problem))
+            }
+            None => Ok(true),
+        }
+    }
+
+    /// The line of the header of another table, if it is the row in hand, or stands soon below it.
+    ///
+    /// # Errors
+    /// Errors of reading, `LineTooLong`.
+    pub(super) fn other_table(&mut self) -> Result<Option<usize>, LogError> {
+        let cells = self.head.cells_min;
+        let line = self.lines.line;
+        let names = words::names(&self.row);
+        if words::are_names(&names, cells) {
+            return Ok(Some(line));
+        }
+        if words::are_numbers(&names) {
+            return Ok(None);
+        }
+        let (head, lines) = (&self.head, &mut self.lines);
+        let is_header = |below: &TextLine<'_>| head.lines.iter().any(|own| own == below.text);
+        let mut below = lines_of(lines.opening()?).take(HEAD_LINES);
+        Ok(below.find(is_header).map(|header| line + header.line))
     }
 
     /// A cell of the row in hand, from 0; empty if there is none.

@@ -5,6 +5,7 @@ mod movements;
 mod patterns;
 mod refuses;
 mod refuses_files;
+mod shapes;
 mod skips;
 
 use super::*;

@@ -140,7 +140,6 @@ fn duration_us(text: &str) -> Option<f64> {
     let number = |text: &str| fast_float2::parse::<f64, _>(text.replace(',', ".")).ok();
     if let Some((text, unit)) = text.rsplit_once(' ') {
         let unit = match unit.to_ascii_lowercase().as_str() {
-            "sec" | "secs" | "seconds" => 1e6,
             "min" => 6e7,
             "h" | "hr" | "hrs" | "hours" => 3.6e9,
             _ => Dimension::Time.unit(unit)?,

@@ -32,9 +32,24 @@ const VOLTAGES: [(&str, f64); 3] = [("V", 1.0), ("mV", 1e-3), ("uV", 1e-6)];
 /// Marks of codes and indices, which have no unit.
 const COUNTS: [&str; 7] = ["", "-", "cnt", "count", "counts", "code", "LSB"];
 
+/// Units by their words.
+const WORDS: [(&str, &str); 7] = [
+    ("sec", "s"),
+    ("secs", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("msec", "ms"),
+    ("volt", "V"),
+    ("volts", "V"),
+];
+
 /// A symbol as the tables here write it.
 fn plain(symbol: &str) -> Cow<'_, str> {
     let symbol = symbol.trim();
+    let mut words = WORDS.into_iter();
+    if let Some((_, unit)) = words.find(|(word, _)| symbol.eq_ignore_ascii_case(word)) {
+        return unit.into();
+    }
     match symbol.is_ascii() {
         true => symbol.into(),
         false => symbol
@@ -157,6 +172,7 @@ mod tests {
     fn a_name_is_split_into_base_and_unit_in_every_spelling() {
         for (name, base, unit) in [
             ("ifm_x_nm", "ifm_x", Some("nm")),
+            ("Time (sec)", "Time", Some("sec")),
             ("X [um]", "X", Some("um")),
             ("X(um)", "X", Some("um")),
             ("X / \u{b5}m", "X", Some("\u{b5}m")),

@@ -258,7 +258,7 @@ fn columns_without_name_cells_or_meaning_are_left_out_with_a_note() {
         ),
         (
             lines(|header| format!("{header},"), |_, row| row.to_owned()),
-            "column 12 without a name",
+            "column 12 without a name (the header ends with a separator)",
         ),
         (
             lines(

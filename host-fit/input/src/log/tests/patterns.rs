@@ -69,6 +69,20 @@ fn a_fault_of_many_rows_is_named_by_its_pattern() {
         pattern(&long(8, |_, code| (code + 90_000).to_string())),
         Pattern::OtherCodes
     );
+    let bits = 16;
+    assert_eq!(
+        pattern(&long(8, |_, code| (code << bits).to_string())),
+        Pattern::LeftJustified { bits }
+    );
+    let value = 9.91e37;
+    assert_eq!(
+        pattern(&long(2, |k, nm| if k % 9 == 8 {
+            "9.91E+37".to_owned()
+        } else {
+            nm.to_string()
+        })),
+        Pattern::Sentinel { value }
+    );
     assert_eq!(
         pattern(&long(8, |_, code| format!("{:.3}", code as f64 / 3.1e3))),
         Pattern::NotCodes
@@ -110,9 +124,9 @@ fn offset_binary_is_named_where_codes_cross_zero() {
 }
 
 #[test]
-fn a_fault_of_few_rows_is_the_fault_of_its_row() {
+fn a_fault_of_one_row_is_the_fault_of_its_row() {
     let error = refused(&long(8, |k, code| {
-        if k % 25 == 7 {
+        if k == 7 {
             "x".to_owned()
         } else {
             code.to_string()
@@ -163,4 +177,24 @@ fn a_clock_that_is_full_is_named_with_its_bits() {
         matches!(back.problem, LogProblem::TimeBackwards { .. }),
         "{back}"
     );
+    let seconds = refused(&long(1, |_, t_us| (t_us % 300_000).to_string()));
+    assert!(
+        matches!(seconds.problem, LogProblem::ClockRestarts { t_us: 0, .. }),
+        "{seconds}"
+    );
+}
+
+#[test]
+fn a_few_bad_cells_are_counted_once_for_all() {
+    let bad = |k: usize, code: i64| match k % 40 {
+        20 => "ERR".to_owned(),
+        _ => code.to_string(),
+    };
+    let error = refused(&long(8, bad)).to_string();
+    assert!(error.contains("5 of 180 rows: \"ERR\""), "{error}");
+    assert!(error.contains("--bad-rows skip"), "{error}");
+    // A fault of another cell in the same rows hides none.
+    let both = long(8, bad).replace(",ERR,", ",ERR,x");
+    let error = refused(&both).to_string();
+    assert!(error.contains("5 of 180 rows"), "{error}");
 }

@@ -13,16 +13,16 @@ fn what_is_wrong_is_named_with_its_place_and_a_remedy() {
         // Cells.
         (",7702,", ",7702nm,", "3: column 5 (ifm_y2_nm), movement 0: ", "\"7702nm\" is not a number"),
         (",97,", ",ERR,", a, "\"ERR\" is not a number"),
-        (",161,", ",NaN,", x, "NaN stands"),
-        (",161,", ",-nan,", x, "NaN stands"),
-        ("97,87,-6", "97,87,NaN", "3: column 11 (hall_c_cnt), movement 0: ", "NaN stands"),
+        (",161,", ",NaN,", x, "stands for a missing value"),
+        (",161,", ",-nan,", x, "stands for a missing value"),
+        ("97,87,-6", "97,87,NaN", "3: column 11 (hall_c_cnt), movement 0: ", "stands for a missing value"),
         (",161,", ",inf,", x, "infinite"),
         (",161,", ",-Infinity,", x, "infinite"),
         (",161,", ",1e999,", x, "infinite"),
         (",161,", ",,", x, "empty"),
         (",161,", ", ,", x, "empty"),
         ("\n4,2000", "\n,2000", "6: column 1 (movement): ", "empty"),
-        (",161,", ",\"161,5\",", x, "decimal comma"),
+        (",161,", ",\"1,161\",", x, "decimal comma"),
         (",161,", ",99999999999,", x, "absurd (more than 8"),
         (",161,", ",-1e30,", x, "m is absurd"),
         (",161,", ",8200000,", x, "m is absurd"),
@@ -43,7 +43,7 @@ fn what_is_wrong_is_named_with_its_place_and_a_remedy() {
         ("\n4,4000,", "\n0,6000,", "7: column 1 (movement), movement 0: ", "left at line 5 and comes back"),
         // Header and lines.
         ("hall_b_cnt", "hall_d_cnt", "1: the column `hall_b_cnt` is missing", "(not known: hall_d_cnt)"),
-        ("hall_b_cnt", "hall_a_cnt", "1: column 10 (hall_a_cnt): it repeats", "column 9"),
+        ("hall_b_cnt", "hall_a_cnt", "1: the column `hall_b_cnt` is missing", ""),
         ("cap1_cnt", "ifm_x_um", "1: the column `cap1_cnt` is missing", "(not known: ifm_x_um)"),
         ("hall_b_cnt", "", "1: the column `hall_b_cnt` is missing", "column 10 without a name"),
         ("ifm_x_nm,ifm_y1_nm", "ifm_x_um,ifm_x_mm", "1: column 4 (ifm_x_mm): it repeats", "column 3"),
@@ -83,7 +83,6 @@ fn tables_that_are_no_log() {
             cells.remove(at.expect("in the header"));
         })
     };
-    let spaces = LOG.replace(',', " ");
     #[rustfmt::skip]
     let cases: &[(&str, &str, &str)] = &[
         (&without("t_us"), ":1: the column `t_us` is missing", "`time = "),
@@ -93,7 +92,6 @@ fn tables_that_are_no_log() {
         ("{\"rows\": 3}\n", ":1: no table", "JSON"),
         ("(1780000000.000005) can0 15A#6C00\n", ":1: no table", "host-fit join"),
         ("hello\n1\n2\n", ":1: \"hello\"", "separate the cells"),
-        (&spaces, ":1: ", "separate the cells"),
         ("", ": the log is empty", ""),
         ("\n\n", ": the log is empty", ""),
         ("# only a note\n", ": the log is empty", ""),

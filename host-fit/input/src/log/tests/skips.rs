@@ -36,7 +36,7 @@ fn bad_cells_are_left_out_and_counted_by_reason() {
     let want = [
         ("a saturated code", 2, 3, 9),
         ("an empty cell", 1, 6, 9),
-        ("a NaN or an infinity", 1, 7, 3),
+        ("a missing value or an infinity", 1, 7, 3),
     ];
     assert_eq!(skipped.collect::<Vec<_>>(), want);
     let want = [(0, 0, 0..1), (0, 4, 1..2)];
