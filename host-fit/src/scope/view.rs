@@ -149,8 +149,9 @@ fn figures_of(facts: &Facts, codes: &[i32], unit: &str, warning: &str) -> Vec<Li
     let noise = facts
         .noise
         .map_or("-".to_owned(), |noise| format!("{noise:.3}"));
+    let digits = usize::from(unit != "codes");
     vec![
-        Line::from(format!(" {low:.1} .. {high:.1} {unit}")),
+        Line::from(format!(" {low:.digits$} .. {high:.digits$} {unit}")),
         Line::from(format!(" noise {noise} {unit}  code {last}")),
         Line::styled(format!(" {warning}"), WARNING),
     ]

@@ -24,6 +24,9 @@ const PICTURE: Duration = Duration::from_millis(100);
 /// The servo period of a bus, s.
 const SERVO_S: f64 = 0.002;
 
+/// A node that skips more ticks has started again: a minute of them.
+const TICKS_MAX: u32 = 30_000;
+
 /// How long a frame may wait for a place in the transmit queue: half a servo period.
 const SEND_DEADLINE: Duration = Duration::from_millis(1);
 
@@ -208,7 +211,7 @@ impl Session<'_> {
         if let Some((raw, reading)) = step.tick {
             self.last = Some(reading);
             if let Some(scope) = &mut self.scope {
-                scope.push(frame.time_us, &raw);
+                scope.push(&raw);
             }
         }
         if let Some(command) = step.command {
@@ -313,10 +316,20 @@ impl Session<'_> {
     }
 }
 
+/// The ticks from one number to the next. A node that starts again counts from anywhere.
+const fn ticks_between(before: u32, now: u32) -> u32 {
+    match now.wrapping_sub(before) {
+        ticks @ 1..TICKS_MAX => ticks,
+        _ => 1,
+    }
+}
+
 /// The codes of the bus in a terminal.
 struct Scope {
     screen: Screen,
     history: History,
+    /// Number and time of the last tick, us: frames come in bunches, and ticks do not.
+    tick: (u32, f64),
     /// What happened last.
     note: String,
 }
@@ -329,15 +342,19 @@ impl Scope {
         Ok(Self {
             screen: Screen::open()?,
             history: History::new(title, scales, SERVO_S),
+            tick: (0, 0.0),
             note: String::new(),
         })
     }
 
-    fn push(&mut self, time_us: u64, raw: &RawFrame) {
+    fn push(&mut self, raw: &RawFrame) {
+        let (number, t_us) = self.tick;
+        let ticks = ticks_between(number, raw.sequence);
+        self.tick = (raw.sequence, t_us + 1e6 * SERVO_S * f64::from(ticks));
         let [a, b, c] = raw.hall;
         let [p, q, r] = raw.capacitive;
         self.history.push(ScopeRow {
-            t_us: time_us as f64,
+            t_us: self.tick.1,
             codes: [a, b, c, p, q, r],
             designed_m: None,
         });
@@ -348,5 +365,17 @@ impl Scope {
         self.history.state = format!("{state}  {:.0} ticks/s  {}", shown.rate_hz, self.note);
         self.screen.draw(&self.history)?;
         self.screen.keys(&mut self.history, Duration::ZERO)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ticks_between;
+
+    #[test]
+    fn ticks_are_counted_over_a_loss_and_not_over_a_restart() {
+        for (before, now, ticks) in [(5, 6, 1), (u32::MAX, 2, 3), (9, 3, 1), (0, 1 << 30, 1)] {
+            assert_eq!(ticks_between(before, now), ticks);
+        }
     }
 }
