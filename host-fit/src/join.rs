@@ -21,7 +21,7 @@ pub use error::JoinError;
 
 use crate::bus::BusAddress;
 use crate::bus::bus_log::BusCounts;
-use crate::cli::arguments::{between, choice};
+use crate::cli::arguments::{StageFile, between, choice};
 use crate::output::Output;
 use clap::Args;
 use hallstage_input::finding::Finding;
@@ -49,9 +49,8 @@ pub(crate) struct JoinSettings {
     /// stage.toml names.
     #[arg(value_name = "B")]
     pub(crate) b: PathBuf,
-    /// The stage as designed.
-    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
-    pub(crate) stage: PathBuf,
+    #[command(flatten)]
+    pub(crate) stage: StageFile,
     /// Where to write the calibration log.
     #[arg(long, value_name = "LOG.csv")]
     pub(crate) out: PathBuf,
@@ -133,13 +132,16 @@ fn check_length(path: &Path, rows: usize) -> Result<(), JoinError> {
 ///
 /// # Errors
 /// See [`JoinError`]; nothing is written then.
-pub(crate) fn run(settings: &JoinSettings, watch: Watch<'static>) -> Result<JoinReport, JoinError> {
-    let stage = Stage::from_file(&settings.stage)?;
-    let [sensors, reference] = sensors_first(&settings.a, &settings.b, &stage)?;
-    let sensors = Sensors::read(sensors, settings, &stage, watch)?;
-    let reference = Reference::read(reference, settings.bad_rows, &stage, watch)?;
-    reference.check_speed(&stage)?;
-    let records = Records::new(&sensors, &reference, &stage);
+pub(crate) fn run(
+    settings: &JoinSettings,
+    stage: &Stage,
+    watch: Watch<'static>,
+) -> Result<JoinReport, JoinError> {
+    let [sensors, reference] = sensors_first(&settings.a, &settings.b, stage)?;
+    let sensors = Sensors::read(sensors, settings, stage, watch)?;
+    let reference = Reference::read(reference, settings.bad_rows, stage, watch)?;
+    reference.check_speed(stage)?;
+    let records = Records::new(&sensors, &reference, stage);
     let (clocks, offset) = records.estimate(settings.offset_us, settings.search_s)?;
 
     let has_temperature = |tick: &Tick| tick.frame.codes.temperature_mc != [MISSING_CODE; 2];
@@ -148,7 +150,7 @@ pub(crate) fn run(settings: &JoinSettings, watch: Watch<'static>) -> Result<Join
         reference.quantities,
         sensors.vertical(),
         has_temperatures,
-        &stage,
+        stage,
     );
     let mut log = Output::create(&settings.out)?;
     let mut text = format.header();

@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The stage file of a command.
-#[derive(Debug, Args)]
-pub(super) struct StageFile {
+#[derive(Clone, Debug, Args)]
+pub(crate) struct StageFile {
     /// The stage as designed.
     #[arg(
         id = "stage",
@@ -26,16 +26,18 @@ pub(super) struct StageFile {
         value_name = "FILE",
         default_value = "stage.toml"
     )]
-    pub(super) path: PathBuf,
+    pub(crate) path: PathBuf,
 }
 
 impl StageFile {
     pub(super) fn read(&self) -> Result<Stage, HostError> {
         match Stage::from_file(&self.path) {
             Err(StageError::Source(error)) if matches!(error.problem, SourceProblem::NotFound) => {
+                let is_here = self.path.parent() == Some(Path::new(""));
+                let place = if is_here { " in this folder" } else { "" };
                 let path = self.path.display();
                 Err(HostError::input(format!(
-                    "there is no {path}; draft one with `host-fit init LOG`, or name one with --stage"
+                    "There is no {path}{place}. Draft one with `host-fit init LOG`, or name one with --stage."
                 )))
             }
             read => Ok(read?),

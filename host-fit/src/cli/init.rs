@@ -4,6 +4,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{is_standard, write_atomically};
 use clap::Args;
+use hallstage_input::axis::counted;
 use hallstage_input::draft::draft;
 use std::path::PathBuf;
 
@@ -38,9 +39,9 @@ pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
         names => format!(", left out: {}", names.join(", ")),
     };
     terminal::print(&format!(
-        "{} columns mapped{left_out}\nwrote {}\n{} lines in it are to be filled in: they begin with \"# FILL IN\"\n",
-        draft.mapped,
+        "{} mapped{left_out}\nwrote {}\n{} in it to be filled in, each begins with \"# FILL IN\"\n",
+        counted(draft.mapped, "column"),
         args.out.display(),
-        draft.to_fill_in
+        counted(draft.to_fill_in, "line")
     ))
 }

@@ -11,9 +11,9 @@ use std::path::PathBuf;
 
 /// Joins both records, and shows how it went.
 pub(super) fn run(args: &JoinSettings) -> Result<(), HostError> {
-    let inputs = [&args.a, &args.b, &args.stage].map(PathBuf::as_path);
+    let inputs = [&args.a, &args.b, &args.stage.path].map(PathBuf::as_path);
     super::check_outputs([Some(args.out.as_path())], None, inputs)?;
-    let report = join::run(args, interrupt::watch())?;
+    let report = join::run(args, &args.stage.read()?, interrupt::watch())?;
     terminal::print(&as_text(&figures(&report).tables()))?;
     terminal::show(&report.warnings);
     let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";

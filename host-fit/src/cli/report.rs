@@ -107,5 +107,5 @@ pub(super) fn finish(
     super::wrote(written)?;
     terminal::warn(warnings);
     terminal::show(&subject.diagnosis.findings);
-    terminal::print(&Summary::new(subject).as_text())
+    terminal::verdict(&Summary::new(subject))
 }

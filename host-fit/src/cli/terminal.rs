@@ -6,6 +6,7 @@
 use crate::cli::error::HostError;
 use crate::report::table::Table;
 use crate::report::text::{as_text, plain};
+use crate::report::verdict::Summary;
 use anstyle::{AnsiColor, Style};
 use hallstage_calibration::words;
 use hallstage_input::finding::{Finding, Severity};
@@ -37,15 +38,34 @@ pub(super) fn is_quiet() -> bool {
 
 /// Writes a table to standard output. A reader that closes the pipe early, as `head` does, is no error.
 pub(super) fn print(text: &str) -> Result<(), HostError> {
+    marked("", Style::new(), text)
+}
+
+/// Writes a summary, its verdict in colour on a terminal.
+pub(super) fn verdict(summary: &Summary) -> Result<(), HostError> {
+    let color = match summary.mark {
+        "good" => AnsiColor::Green,
+        "limited" => AnsiColor::Yellow,
+        _ => AnsiColor::Red,
+    };
+    let text = summary.as_text();
+    let rest = text.strip_prefix(summary.word).unwrap_or(&text);
+    let style = Style::new().bold().fg_color(Some(color.into()));
+    marked(summary.word, style, rest)
+}
+
+/// Writes a word in a style and a text.
+fn marked(word: &str, style: Style, text: &str) -> Result<(), HostError> {
     if is_quiet() {
         return Ok(());
     }
     let text = for_locale(plain(text, "\n"));
+    let text = format!("{style}{word}{style:#}{text}");
     if TAKEN.load(Ordering::Relaxed) {
-        let _ = std::io::stderr().write_all(text.as_bytes());
+        let _ = anstream::stderr().write_all(text.as_bytes());
         return Ok(());
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = anstream::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::input(format!(
             "cannot write to standard output: {error}"

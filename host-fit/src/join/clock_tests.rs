@@ -1,6 +1,6 @@
 //! Clocks that differ, over two minutes.
 
-use super::tests::{M_PER_CODE, files, hall, record, reference_of, signals_m};
+use super::tests::{M_PER_CODE, files, hall, record, reference_of, run, signals_m};
 use super::*;
 
 const TICKS: u32 = 57_000;
@@ -16,7 +16,7 @@ fn imported(controller: f64, interferometer: f64) -> Result<(f64, JoinReport), J
     );
     let reference = reference_of(TICKS, interferometer, None);
     let import = files(&bus, &reference).with(|settings| settings.search_s = Some(0.1));
-    let report = run(&import.settings, Watch::NONE)?;
+    let report = run(&import.settings)?;
     let distance = import.log().rows.into_iter().flat_map(|row| {
         let codes = row.frame.hall().map(|code| f64::from(code) * M_PER_CODE);
         let pairs = signals_m(row.reference).into_iter().zip(codes);

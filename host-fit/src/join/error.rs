@@ -4,15 +4,11 @@ use super::pairing::JoinCounts;
 use crate::output::OutputError;
 use hal_adapters::candump::LineError;
 use hallstage_input::log::LogError;
-use hallstage_input::stage::StageError;
 use std::path::PathBuf;
 
 /// Why a join was refused. The output is not written.
 #[derive(Debug, thiserror::Error)]
 pub enum JoinError {
-    /// The stage file is refused.
-    #[error(transparent)]
-    Stage(#[from] StageError),
     /// The record or the reference cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),

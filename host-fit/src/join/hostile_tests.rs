@@ -27,7 +27,7 @@ fn codes_beyond_the_converter_are_refused_and_those_at_its_rails_left_out() {
     let import = |code_max: &str| {
         let import = files(&candump(|_, _| false), &reference());
         let text = hallstage_input::shipped::STAGE_TOML.replace("32767", code_max);
-        std::fs::write(&import.settings.stage, text).expect("written");
+        std::fs::write(&import.settings.stage.path, text).expect("written");
         import
     };
     // A motion of 300 um has codes up to 4800; with the lever arm more.

@@ -96,7 +96,7 @@ impl Reference {
         let movement = cells.movement;
         let period_us = table.period_us(cells.time, movement)?.unwrap_or_default();
         let places = OrderCells {
-            time: cells.time.cell,
+            time: cells.time,
             movement: movement.map(|source| source.cell),
         };
         let mut order = Order::new(places, period_us);

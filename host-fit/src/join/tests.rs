@@ -120,7 +120,9 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     let settings = JoinSettings {
         a: path("bus.log"),
         b: path("ifm.csv"),
-        stage: path("stage.toml"),
+        stage: StageFile {
+            path: path("stage.toml"),
+        },
         out: path("log.csv"),
         tolerance_us: None,
         offset_us: None,
@@ -134,6 +136,12 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     }
 }
 
+/// Joins by the stage of the settings.
+pub(super) fn run(settings: &JoinSettings) -> Result<JoinReport, JoinError> {
+    let stage = Stage::from_file(&settings.stage.path).expect("sound");
+    super::run(settings, &stage, Watch::NONE)
+}
+
 impl Import {
     /// With another setting.
     pub(super) fn with(mut self, change: impl FnOnce(&mut JoinSettings)) -> Self {
@@ -142,13 +150,13 @@ impl Import {
     }
 
     pub(super) fn run(&self) -> JoinReport {
-        run(&self.settings, Watch::NONE).unwrap_or_else(|error| panic!("{error}"))
+        run(&self.settings).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// Joins, sees that it is refused, and that nothing is written.
     #[track_caller]
     pub(super) fn refused(&self, is_why: impl Fn(&JoinError) -> bool) -> String {
-        let error = run(&self.settings, Watch::NONE).expect_err("refused");
+        let error = run(&self.settings).expect_err("refused");
         assert!(is_why(&error), "{error}");
         assert!(!self.settings.out.exists(), "{error}");
         error.to_string()
@@ -172,7 +180,7 @@ impl Import {
 
     /// The log that it wrote.
     pub(super) fn log(&self) -> hallstage_input::dataset::Dataset {
-        let stage = Stage::from_file(&self.settings.stage).expect("sound");
+        let stage = Stage::from_file(&self.settings.stage.path).expect("sound");
         let paths = std::slice::from_ref(&self.settings.out);
         let read = log::read(paths, &stage, &ReadOptions::default());
         read.expect("a sound log").dataset
@@ -261,7 +269,7 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
         };
         let bus = candump_with(|_, _| false, noisy);
         let import = files(&bus, &reference());
-        let outcome = run(&import.settings, Watch::NONE);
+        let outcome = run(&import.settings);
         assert_eq!(outcome.is_ok(), import.settings.out.exists());
         outcome.map(|report| report.offset.standard_error_us)
     };

@@ -52,7 +52,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
         ),
         (
             "gaps.csv",
-            "capacitive sensor 1 and capacitive sensor 2 are exchanged",
+            "capacitive sensor 1 and capacitive sensor 2 seem to be swapped; exchanged, the log fits stage.toml",
             "capacitive_swapped",
         ),
     ] {
@@ -62,6 +62,12 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
         assert_eq!(bench.json("p.json")["findings"][0]["code"], code);
         let output = bench.good(&format!("{fit} --force"));
         assert!(stderr(&output).contains("written all the same, as --force asks"));
+        let coloured = bench.command(&fit).env("CLICOLOR_FORCE", "1").output();
+        let coloured = stdout(&coloured.expect("run"));
+        assert!(
+            coloured.contains("\x1b[1m\x1b[31mRefused\x1b[0m\n"),
+            "{coloured}"
+        );
         let inspect = bench.good("inspect p.bin --json i.json");
         assert!(stderr(&inspect).contains("(--force)"));
         assert_eq!(bench.json("i.json")["fit"]["forced"], true);

@@ -5,6 +5,21 @@ use hallstage_input::finding::{Cause, Code, Correction};
 
 /// The evidence of a mistake.
 pub(super) fn mistake(causes: &[Cause], is_sure: bool, may_be_magnets: bool) -> String {
+    if let (
+        [
+            Cause {
+                correction: Correction::Exchange(pair),
+                ..
+            },
+        ],
+        false,
+    ) = (causes, may_be_magnets)
+    {
+        return format!(
+            "{} seem to be swapped; exchanged, the log fits stage.toml",
+            titles(pair)
+        );
+    }
     let does_fit = match is_sure {
         true => "the log does not match stage.toml. It fits",
         false => "the log is consistent but does not match stage.toml. It would fit",

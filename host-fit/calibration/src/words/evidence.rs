@@ -133,7 +133,7 @@ pub(super) fn evidence(found: &Finding) -> String {
         }
         Kind::OtherMotion { micro, service_micro, unit, .. } => {
             let unit = sign(unit);
-            format!("the log moves {on} by {micro:.0} {unit} to either side, service by {service_micro:.0} {unit} ([motion] in stage.toml)")
+            format!("{on} moves ±{micro:.0} {unit}; [motion] says ±{service_micro:.0} {unit}")
         }
         Kind::InMotion { ratio, corrected_ratio, acceleration_m_s2, speed_mm_s, shows_acceleration, lag_us: [a, b, c] } => {
             let (corrected, known) = match shows_acceleration {
@@ -153,14 +153,14 @@ pub(super) fn evidence(found: &Finding) -> String {
             let (place, symbol, key) = SENSORS[*sensor];
             let [a, b, c] = percent_per_k.map(|[value, error]| format!("{value:.4}({error:.4})"));
             let origin = match (*span_k > 0.0, is_field) {
-                (true, _) => format!("from logs {span_k:.1} K apart"),
-                (false, false) => "as stage.toml expects, because only the field model fits it".to_owned(),
-                (false, true) => "as stage.toml expects, because the temperature hardly changes".to_owned(),
+                (true, _) => format!(", from logs {span_k:.1} K apart"),
+                (false, false) => format!(". Not measured: only the field model fits it. The value expected by `{key}` in [temperature] is used"),
+                (false, true) => format!(". Not measured: the temperature changed by less than 2 K. The value expected by `{key}` in [temperature] is used"),
             };
             let other = deviations.map_or(String::new(), |deviations| {
                 format!(". This is {deviations:.0} standard deviations from `{key}` in [temperature]")
             });
-            format!("the coefficient {symbol} of A, B, C is {a}, {b}, {c} %/K of the {place} temperature from {zero_c:.2} °C, {origin}{other}")
+            format!("the coefficient {symbol} of A, B, C is {a}, {b}, {c} %/K of the {place} temperature from {zero_c:.2} °C{origin}{other}")
         }
         Kind::TemperaturesExchanged { log_odds } => {
             let odds = libm::exp(log_odds.min(libm::log(1e6)));

@@ -84,7 +84,7 @@ pub fn remedy(found: &Finding) -> String {
         Kind::MovementsMissed { .. } => "use --draw stratified, or a larger --train",
         Kind::OtherUnit { .. } => "check the unit of the column in the log and in stage.toml",
         Kind::TemperaturesExchanged { .. } => "check `mount` and `body` in [temperature], and the sensors",
-        Kind::OtherMotion { is_scale: true, .. } => "check units and scales, because nothing else shows a wrong scale of all channels of a kind; or declare the motion",
+        Kind::OtherMotion { is_scale: true, .. } => "correct the scale or [motion]",
         Kind::OtherMotion { .. } => "errors beyond the range of the log are larger than predicted; host-fit plan makes a run of the full range",
         Kind::BeyondRange { .. } => "fit logs of the whole range of service",
         Kind::NoTemperature { .. } => "check the columns of [temperature], their units and the sensors",
