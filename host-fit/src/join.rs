@@ -54,8 +54,8 @@ pub(crate) struct JoinSettings {
     /// Where to write the calibration log.
     #[arg(long, value_name = "LOG.csv")]
     pub(crate) out: PathBuf,
-    /// Largest time from a row of the sensors to the samples of the reference before and after it, us; the longer of
-    /// the periods of the two records if not given.
+    /// Largest time from the sample of the reference before a row of the sensors to the sample after it, us; one and a
+    /// half of the longer of both periods if not given.
     #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) tolerance_us: Option<u32>,
     /// Start of the search: time of the sensors less time of the reference, us.
@@ -110,6 +110,9 @@ impl JoinReport {
 /// Most rows of a table: two hours at 1 kHz.
 const ROWS_MAX: usize = 7_200_000;
 
+/// A longer time between samples of the reference is a gap, in the longer of both periods.
+const GAP_PERIODS: f64 = 1.5;
+
 /// Bytes of the log that are written at a time, about.
 const TEXT_BYTES: usize = 1 << 16;
 
@@ -155,7 +158,9 @@ pub(crate) fn run(
     let mut log = Output::create(&settings.out)?;
     let mut text = format.header();
     let period_us = sensors.period_us.max(reference.period_us);
-    let tolerance_us = settings.tolerance_us.map_or(period_us, f64::from);
+    let tolerance_us = settings
+        .tolerance_us
+        .map_or(GAP_PERIODS * period_us, f64::from);
     let join = join(
         &sensors.ticks,
         &reference.samples,

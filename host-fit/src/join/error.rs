@@ -178,8 +178,8 @@ pub enum JoinError {
     #[error(
         "most of the two records do not belong together: {} of {} ticks have a reference, which covers {:.1} s of \
          the reference's {:.1} s. On its clock the ticks lie from {:.0} to {:.0} us, its samples from {:.0} to {:.0} us; {} ticks \
-         are outside its time, {} between movements, {} further than --tolerance-us (the longer of the two periods, if it is not given) from \
-         a sample. Name records of one run; cut what one record has more than the other, or give a larger --tolerance-us",
+         are outside its time, {} between movements, {} in gaps of the reference of more than --tolerance-us (one and a half of \
+         the longer of both periods, if it is not given). Name records of one run; cut what one record has more than the other, or give a larger --tolerance-us",
         .0.rows, .0.ticks, .0.covered_s, .0.reference_s, .0.sensors_us[0], .0.sensors_us[1], .0.reference_us[0], .0.reference_us[1],
         .0.outside, .0.between_movements, .0.too_far
     )]

@@ -83,7 +83,7 @@ pub(super) struct Records<'r> {
     /// The usual time from tick to tick, us.
     period_us: f64,
     /// The longer of the periods of the two records, us.
-    tolerance_us: f64,
+    longer_us: f64,
     /// The servo period, us.
     servo_us: f64,
     /// m or rad per unit of the reference's columns.
@@ -142,7 +142,7 @@ impl<'r> Records<'r> {
             recorder_us: sensors.recorder_us,
             samples: &reference.samples,
             period_us: sensors.period_us,
-            tolerance_us: sensors.period_us.max(reference.period_us),
+            longer_us: sensors.period_us.max(reference.period_us),
             servo_us: stage.servo_period_s * 1e6,
             scale: reference.quantities.map(|q| stage.log.column(q).scale),
             stage,

@@ -38,7 +38,7 @@ pub struct JoinCounts {
     pub outside: usize,
     /// Ticks between samples of different movements.
     pub between_movements: usize,
-    /// Ticks with a sample before or after further away than the tolerance.
+    /// Ticks in a gap of the reference that is longer than the tolerance.
     pub too_far: usize,
     /// Largest time from a joined tick to the nearer of its samples, us.
     pub nearest_max_us: f64,
@@ -70,7 +70,7 @@ pub(super) enum ReferenceAt {
     TooFar,
 }
 
-/// The reference at a time.
+/// The reference at a time between two samples that are at most the tolerance apart.
 pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> ReferenceAt {
     let next = samples.partition_point(|sample| sample.t_us < t_us);
     let Some(after) = samples.get(next) else {
@@ -85,7 +85,7 @@ pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> ReferenceA
         return ReferenceAt::BetweenMovements;
     }
     let (since, until) = (t_us - before.t_us, after.t_us - t_us);
-    if since > tolerance_us || until > tolerance_us {
+    if since + until > tolerance_us {
         return ReferenceAt::TooFar;
     }
     let values = match next
@@ -186,7 +186,7 @@ pub(super) fn join(
         counts.nearest_max_us = counts.nearest_max_us.max(nearest_us);
         if let Some((last, before_us)) = row.replace((movement, t_us))
             && last == movement
-            && t_us - before_us <= (GAP_TICKS * period_us).max(2.0 * tolerance_us)
+            && t_us - before_us <= (GAP_TICKS * period_us).max(tolerance_us)
         {
             counts.covered_s += (t_us - before_us) * 1e-6;
         }

@@ -10,6 +10,7 @@ use hallstage_input::log::table::Table;
 use hallstage_input::log::time::Clock;
 use hallstage_input::log::{BadRows, LogError, LogProblem};
 use hallstage_input::stage::Stage;
+use hallstage_input::statistics::quantile;
 use hallstage_input::text::TextReader;
 use hallstage_input::watch::Watch;
 use std::path::Path;
@@ -62,6 +63,9 @@ struct Value {
 /// A reference that holds its values for more rows than this on average is not sampled in each row.
 const HELD_ROWS: f64 = 1.5;
 
+/// A reference is too slow if a cubic misses its motion in more samples than this leaves. Fewer are spikes.
+const MOST: f64 = 0.95;
+
 /// Error of a cubic in the middle between samples, in fourth differences.
 const CUBIC: f64 = 3.0 / 128.0;
 
@@ -104,16 +108,18 @@ impl Reference {
             has_movements: movement.is_some(),
             ..ReferenceCounts::default()
         };
+        let mut first_bad: Option<LogError> = None;
         let (mut samples, mut clock, mut shift_us) = (Vec::<Sample>::new(), Clock::default(), 0.0);
         while table.next_row()? {
             check_length(&table.head.path, counts.rows)?;
             counts.rows += 1;
             let mut sample = match cells.sample(&table, &mut clock) {
-                Err(_) if bad_rows == BadRows::Skip => {
+                Err(bad) => {
                     counts.bad += 1;
+                    first_bad.get_or_insert(bad);
                     continue;
                 }
-                read => read?,
+                Ok(sample) => sample,
             };
             let (line, named) = (table.row_line(), Some(sample.movement));
             match order.take(&table.head, line, named, sample.t_us) {
@@ -150,6 +156,9 @@ impl Reference {
             }
             samples.push(sample);
         }
+        if let Some(bad) = first_bad.filter(|_| bad_rows == BadRows::Refuse) {
+            return Err(bad.of_rows(counts.bad, counts.rows).into());
+        }
         match samples.len() {
             0 | 1 => Err(JoinError::NoReference {
                 path: table.head.path,
@@ -173,7 +182,7 @@ impl Reference {
         let scale = self
             .quantities
             .map(|quantity| stage.log.column(quantity).scale);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut errors_m = Vec::new();
         for five in self.samples.windows(5) {
             let is_even = five.windows(2).all(|pair| {
                 let step_us = pair[1].t_us - pair[0].t_us;
@@ -183,8 +192,7 @@ impl Reference {
                 // The third value may be a rotation.
                 for (k, scale) in scale.iter().enumerate().take(2) {
                     let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|at| scale * five[at].values[k]);
-                    sum += (CUBIC * (a - 4.0 * b + 6.0 * c - 4.0 * d + e)).powi(2);
-                    count += 1.0;
+                    errors_m.push(CUBIC * (a - 4.0 * b + 6.0 * c - 4.0 * d + e).abs());
                 }
             }
         }
@@ -193,14 +201,21 @@ impl Reference {
             .windows(2)
             .filter(|pair| pair[0].values != pair[1].values);
         let held_rows = self.samples.len() as f64 / (1 + changes.count()) as f64;
-        let rms_m = (sum / f64::max(count, 1.0)).sqrt();
-        match rms_m <= stage.hall.m_per_count {
-            true => Ok(()),
-            false if held_rows > HELD_ROWS => Err(JoinError::ReferenceHeld { rows: held_rows }),
-            false => Err(JoinError::ReferenceTooSlow {
+        let sum: f64 = errors_m.iter().map(|error_m| error_m * error_m).sum();
+        let rms_m = (sum / f64::max(errors_m.len() as f64, 1.0)).sqrt();
+        let most_m = quantile(&mut errors_m, MOST).unwrap_or_default();
+        let limit_m = stage.hall.m_per_count;
+        if rms_m <= limit_m {
+            Ok(())
+        } else if held_rows > HELD_ROWS {
+            Err(JoinError::ReferenceHeld { rows: held_rows })
+        } else if most_m <= limit_m {
+            Ok(())
+        } else {
+            Err(JoinError::ReferenceTooSlow {
                 period_ms: self.period_us * 1e-3,
                 rms_um: rms_m * 1e6,
-            }),
+            })
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Two tables, each with its own clock.
 
-use super::tests::{Import, files, hall, reference, reference_of};
+use super::tests::{Import, files, hall, pose, reference, reference_of};
 use super::*;
 use hallstage_input::finding::Kind;
 use std::fmt::Write;
@@ -57,6 +57,20 @@ fn tables_are_joined_in_any_order_whatever_their_rates_ends_and_gaps() {
     join.check_poses(1e-9);
     let swapped = join.with(|settings| std::mem::swap(&mut settings.a, &mut settings.b));
     assert_eq!(swapped.run(), report);
+}
+
+#[test]
+fn a_reference_with_jitter_and_a_few_spikes_has_a_sample_for_every_row() {
+    let mut ifm = "t_us,x_m,y_m,rz_rad\n".to_owned();
+    for k in 0..750 {
+        let t_us = 2_000.0 * f64::from(k) + f64::from(k * 7919 % 41) - 20.0;
+        let [x, y, rz] = pose(t_us);
+        let x = if k % 200 == 100 { -9.999e-6 } else { x };
+        writeln!(ifm, "{t_us},{x:.12},{y:.12},{rz:.12}").expect("a string");
+    }
+    let report = tables(&sensors(4_000.0, 500.0, |_| true), &ifm).run();
+    assert_eq!(report.join.too_far, 0);
+    assert!(report.join.rows > 2_900, "{:?}", report.join);
 }
 
 /// Three cycles of the same motion: each shift by a cycle explains as much.

@@ -15,7 +15,7 @@ pub(super) const M_PER_CODE: f64 = 6.25e-8;
 const TICKS: u32 = 750;
 
 /// X, Y, Rz at a time of the reference, m, m, rad: one axis a movement, in turn.
-fn pose(t_us: f64) -> [f64; 3] {
+pub(super) fn pose(t_us: f64) -> [f64; 3] {
     let axis = (t_us / MOVEMENT_US).floor() as usize % 3;
     let angle = TAU * (t_us / MOVEMENT_US).fract();
     let mut q = [0.0; 3];

@@ -103,6 +103,28 @@ pub enum Pattern {
     },
 }
 
+impl LogError {
+    /// The error of a cell, as the first of several such cells in so many rows.
+    #[must_use]
+    pub fn of_rows(self, faults: usize, rows: usize) -> Self {
+        match self.problem {
+            // Its remedy is the same for all.
+            LogProblem::Cell(fault @ CellFault::Saturated { .. }) => {
+                self.place.refuse(fault.into())
+            }
+            LogProblem::Cell(fault) if faults > 1 && 2 * faults < rows => {
+                let pattern = Pattern::Scattered(fault);
+                self.place.refuse(LogProblem::Pattern {
+                    faults,
+                    rows,
+                    pattern,
+                })
+            }
+            problem => self.place.refuse(problem),
+        }
+    }
+}
+
 impl LogRows<'_> {
     /// The error of a log, named by its pattern where several rows have the same fault; reads on to count them.
     pub(super) fn named_by_pattern(&mut self, error: LogError) -> LogError {
@@ -160,14 +182,8 @@ impl LogRows<'_> {
             LogProblem::Cell(fault) => Pattern::of_cells(fault, &numbers, faults),
             _ => None,
         };
-        let is_usual = faults >= ROWS_MIN && faults * ONE_IN >= rows;
-        let pattern = match &error.problem {
-            _ if is_usual => pattern,
-            LogProblem::Cell(CellFault::Saturated { .. }) => None,
-            LogProblem::Cell(fault) if faults > 1 => Some(Pattern::Scattered(fault.clone())),
-            _ => None,
-        };
         match pattern {
+            _ if faults < ROWS_MIN || faults * ONE_IN < rows => error.of_rows(faults, rows),
             Some(pattern) => error.place.refuse(LogProblem::Pattern {
                 faults,
                 rows,

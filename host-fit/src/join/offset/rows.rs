@@ -85,7 +85,7 @@ impl Records<'_> {
     fn at(&self, t_us: f64, vertical: [f64; 3]) -> Option<(i64, [f64; 3])> {
         let ReferenceAt::Found {
             movement, values, ..
-        } = at(self.samples, t_us, 2.0 * self.tolerance_us)
+        } = at(self.samples, t_us, 4.0 * self.longer_us)
         else {
             return None;
         };
