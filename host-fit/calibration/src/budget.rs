@@ -183,10 +183,11 @@ impl Budget {
 
     /// Variances of X, Y, Rz (m2, m2, rad2) at a pose, beside the variances of the posterior.
     pub fn variance_at(&self, planar: [f64; 3], vertical: [f64; 3]) -> [f64; 3] {
-        let at = [planar, vertical].concat();
+        let at = [planar, vertical];
+        let at = at.as_flattened();
         let effects = self.sources.iter().flat_map(|source| &source.effects);
         effects.fold(self.other, |sum, effect| {
-            let error = effect.map(|row| row.iter().zip(&at).map(|(by, x)| by * x).sum::<f64>());
+            let error = effect.map(|row| row.iter().zip(at).map(|(by, x)| by * x).sum::<f64>());
             [0, 1, 2].map(|axis| sum[axis] + error[axis] * error[axis])
         })
     }

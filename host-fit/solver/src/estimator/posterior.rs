@@ -24,7 +24,7 @@ pub struct Posterior {
     pub covariance: DMatrix<f64>,
     /// Which parameters these are, by their places among the 81 and k and h.
     pub determined: Vec<usize>,
-    parameters: FieldParameters,
+    probes: [Probe; 3],
     /// Noise of the probes that makes the noise floor, m.
     pub white_m: [f64; 3],
 }
@@ -112,13 +112,13 @@ impl Posterior {
         Self {
             determined: (0..covariance.nrows()).collect(),
             covariance,
-            parameters: *parameters,
+            probes: probes(parameters),
             white_m: noise.white_m,
         }
     }
 
     /// The posterior of the parameters at the places `determined`.
-    pub const fn from_sandwich(
+    pub fn from_sandwich(
         determined: Vec<usize>,
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
@@ -126,7 +126,7 @@ impl Posterior {
         Self {
             covariance,
             determined,
-            parameters: *parameters,
+            probes: probes(parameters),
             white_m: [0.0; 3],
         }
     }
@@ -143,7 +143,7 @@ impl Posterior {
         }
         Self {
             covariance: whole,
-            parameters: *parameters,
+            probes: probes(parameters),
             ..self.clone()
         }
     }
@@ -204,18 +204,45 @@ impl Posterior {
     /// What is to be expected of the pose `planar` (m, m, rad) at `vertical` (m, rad, rad);
     /// `None` where the probes don't determine it.
     pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
-        let errors = PoseErrors::new(&probes(&self.parameters), planar, vertical)?;
-        let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
-        let covariance = self.covariance.view((0, 0), (COUNT, COUNT));
-        let systematic = &by_parameter * covariance * by_parameter.transpose();
+        let read = self
+            .probes
+            .each_ref()
+            .map(|probe| probe.read(planar, vertical));
+        let by_signal = inverse(&from_rows(&read.map(|r| r.by_pose)))?;
+        let of_signals = self.of_signals(&read.map(|r| r.by_parameter));
         let by_probes = |errors_m: [f64; 3]| {
-            let by = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * errors_m[k]);
+            let by = by_signal * Matrix3::from_diagonal(&errors_m.into());
             by * by.transpose()
         };
         Some(PoseUncertainty {
-            systematic: systematic.fixed_view::<3, 3>(0, 0) + by_probes([FORM_M; 3]),
+            systematic: by_signal * of_signals * by_signal.transpose() + by_probes([FORM_M; 3]),
             noise: by_probes(self.white_m),
         })
+    }
+
+    /// Covariance of the signals of the probes (m2) by the errors of the parameters, from the derivatives of each signal.
+    fn of_signals(&self, by_parameter: &[[f64; PER_PROBE]; 3]) -> Matrix3<f64> {
+        let rows = self.covariance.nrows();
+        let mut columns = self.covariance.as_slice().chunks_exact(3 * rows);
+        let mut out = Matrix3::zeros();
+        for (one, derivatives) in by_parameter.iter().enumerate() {
+            // A sum for each row, over three columns at once: the processor adds several rows at once.
+            let mut sums = [0.0; COUNT];
+            let sums = &mut sums[..(one + 1) * PER_PROBE];
+            for ([a, b, c], columns) in derivatives.as_chunks().0.iter().zip(&mut columns) {
+                let column = |k: usize| columns[k * rows..].iter();
+                let columns = column(0).zip(column(1)).zip(column(2));
+                for (sum, ((of_a, of_b), of_c)) in sums.iter_mut().zip(columns) {
+                    *sum += a * of_a + b * of_b + c * of_c;
+                }
+            }
+            for (other, sums) in sums.chunks_exact(PER_PROBE).enumerate() {
+                let pairs = by_parameter[other].iter().zip(sums);
+                out[(one, other)] = pairs.map(|(derivative, sum)| derivative * sum).sum();
+                out[(other, one)] = out[(one, other)];
+            }
+        }
+        out
     }
 }
 

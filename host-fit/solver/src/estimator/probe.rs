@@ -4,7 +4,7 @@ use super::parameters::{FieldParameters, place};
 use super::terms::{CARRY, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPE_UNIT_M, SHAPES, SLOPES, THETA};
 
 /// One probe, ready to be evaluated at many poses.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
     values: [f64; PER_PROBE],
     gain_per_k: [f64; 2],

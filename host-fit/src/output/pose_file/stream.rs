@@ -49,11 +49,15 @@ impl DecodeSettings<'_> {
     }
 
     fn write(&self, row: &PoseRow, bytes: &mut Vec<u8>) {
-        let uncertainties = self.known.map(|known| known.at(&row.reading));
-        let uncertainties = uncertainties.unwrap_or_default();
+        let at = self
+            .known
+            .and_then(|known| known.at(&row.reading))
+            .unwrap_or_default();
+        let count = self.known.map_or(0, KnownErrors::count);
+        let uncertainties = &at.as_flattened()[..count];
         match self.format {
-            PoseFormat::Csv => text::line(bytes, row, &uncertainties),
-            PoseFormat::Npy => npy::record(bytes, row, &uncertainties),
+            PoseFormat::Csv => text::line(bytes, row, uncertainties),
+            PoseFormat::Npy => npy::record(bytes, row, uncertainties),
         }
     }
 }
