@@ -4,12 +4,14 @@ mod causes;
 mod evidence;
 mod finding;
 mod fit;
+mod python;
 mod refusal;
 mod run;
 mod verdict;
 
 pub use finding::{message, remedy};
 pub use fit::{model_reason, search_stopped, stopped};
+pub use python::python;
 pub use refusal::{NO_FIT, WordedRefusal, refusal};
 pub use verdict::{own_logs, up_to, verdict};
 
