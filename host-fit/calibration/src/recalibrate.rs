@@ -48,7 +48,7 @@ use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::update::{Change, update};
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
-use runtime::{Calibration, ModelKind, ParameterSet};
+use runtime::{Calibration, ParameterSet};
 
 /// Largest increase of the systematic errors in service, over the noise (variances), with gains. After two seconds
 /// that determine the gains it is 0.01, after one axis for three gains 0.1 and far more. Errors in service are
@@ -214,7 +214,8 @@ pub fn recalibrate(
         logs_sha256: dataset.sha256,
         fit: FitRecord::default(),
     };
-    let set = prepare(old, &update.parameters, stage, &origin)?;
+    let set = with_parameters(old, &update.parameters, stage, &origin)
+        .map_err(RecalibrateError::Unusable)?;
     let judgement = judged(&set);
     let predicted = declared_service(stage, &update.parameters, update.noise.white_m)
         .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
@@ -262,18 +263,20 @@ pub fn recalibrate(
     })
 }
 
-/// `old` with other parameters.
-fn prepare(
+/// A blob with other parameters of its model: range and correction of motion stay as they are.
+///
+/// # Errors
+/// [`ParameterError`] where no decoder can use them.
+pub fn with_parameters(
     old: &ParameterSet,
     parameters: &FieldParameters,
     stage: &Stage,
     origin: &Origin,
-) -> Result<ParameterSet, RecalibrateError> {
+) -> Result<ParameterSet, ParameterError> {
     let mut temperature = old.constants.temperature.rounded::<f64>();
     for (per_mk, beyond) in temperature.per_mk.iter_mut().zip(parameters.gain_per_k) {
         (0..2).for_each(|sensor| per_mk[sensor] += 1e-3 * beyond[sensor]);
     }
-    let made = calibration([], stage, ModelKind::Field, parameters);
     let made = Calibration {
         hall_window: old.constants.hall_window,
         capacitive_window: old.constants.capacitive_window,
@@ -282,9 +285,9 @@ fn prepare(
         sensitivity_min: old.constants.sensitivity_min.into(),
         temperature,
         motion_correction: old.motion_correction,
-        ..made.map_err(RecalibrateError::Unusable)?
+        ..calibration([], stage, old.model, parameters)?
     };
-    made.prepare(origin).map_err(RecalibrateError::Unusable)
+    made.prepare(origin)
 }
 
 #[cfg(test)]

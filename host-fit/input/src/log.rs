@@ -163,22 +163,24 @@ pub fn read_bytes(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    read_each_of_bytes(bytes, path, stage, options, |_, _| ())
+    let text = TextReader::from_reader(bytes, path).map_err(LogError::from);
+    read_texts([text], stage, options, |_, _| ())
 }
 
-/// The same; `take` gets every row, with the number of the log: 0.
+/// As [`read_each`], of logs that are in memory with their names.
 ///
 /// # Errors
 /// As [`read_bytes`].
-pub fn read_each_of_bytes(
-    bytes: &[u8],
-    path: &Path,
+pub fn read_each_of_bytes<P: AsRef<Path>>(
+    logs: &[(P, Vec<u8>)],
     stage: &Stage,
     options: &ReadOptions,
     take: impl FnMut(usize, &LogRow),
 ) -> Result<LogReading, LogError> {
-    let text = TextReader::from_reader(bytes, path).map_err(LogError::from);
-    read_texts([text], stage, options, take)
+    let texts = logs
+        .iter()
+        .map(|(path, bytes)| Ok(TextReader::from_reader(bytes.as_slice(), path.as_ref())?));
+    read_texts(texts, stage, options, take)
 }
 
 fn read_texts<'t>(

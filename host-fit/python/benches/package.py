@@ -42,13 +42,13 @@ def main() -> None:
     hs.write_demo(folder)
     stage_file, run30 = folder / "stage.toml", folder / "run30.csv.gz"
     stage = hs.Stage.load(stage_file)
-    service = hs.read_log(folder / "service.csv.gz", stage)
+    service = hs.Log.load(folder / "service.csv.gz", stage)
     times = ROWS // len(service)
     hall = np.tile(service.hall, (times, 1))
     caps = np.tile(service.caps, (times, 1)) if service.caps is not None else hall
     models: list[Literal["31", "field"]] = ["31", "field"]
     for model in models:
-        dec = hs.fit(hs.read_log(run30, stage), model=model).decoder()
+        dec = hs.fit(hs.Log.load(run30, stage), model=model).decoder()
         rate = len(hall) * 1e-6 / seconds(partial(dec, hall=hall, caps=caps))
         print(f"RESULT decode_{model}_million_ticks_per_s={rate:.1f}", flush=True)
 
@@ -56,7 +56,7 @@ def main() -> None:
     command: list[str | Path] = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]
 
     def package() -> None:
-        hs.fit(hs.read_log(run30, stage)).save(folder / "own.bin")
+        hs.fit(hs.Log.load(run30, stage)).save(folder / "own.bin")
 
     def started() -> None:
         subprocess.run(command, check=True)

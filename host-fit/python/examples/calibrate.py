@@ -17,11 +17,11 @@ from scipy.optimize import least_squares
 folder = Path("calibrated")
 hs.write_demo(folder)
 stage = hs.Stage.load(folder / "stage.toml")
-log = hs.read_log(folder / "run30.csv.gz", stage)
+log = hs.Log.load(folder / "run30.csv.gz", stage)
 print(log)
 
 # %% Look: codes of the Hall probes, and where the interferometers saw the stage
-seconds = log.t_us * 1e-6
+seconds = log.time
 figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(7, 4), layout="constrained")
 top.plot(seconds, log.hall, linewidth=0.7, label=["A", "B", "C"])
 top.set_ylabel("Hall code")
@@ -44,7 +44,7 @@ for parameter in list(cal.parameters.values())[:6]:
 
 # %% Residuals over time, and their spectrum: mains hum, drift or a resonance would show
 residuals = cal.residuals()
-figure = residuals.plot()
+figure = residuals.plot()[0].figure
 figure.set_size_inches(7, 4)
 figure.savefig(folder / "residuals.png", dpi=80)
 
@@ -95,7 +95,7 @@ for name, own, other in zip(names, found, theirs.x, strict=True):
 np.testing.assert_allclose(found, theirs.x, rtol=1e-5, atol=1e-6)
 
 # %% Decode as the controller does, to the bit, on a log that the fit has not seen
-service = hs.read_log(folder / "service.csv.gz", stage)
+service = hs.Log.load(folder / "service.csv.gz", stage)
 decoder = cal.decoder()
 decoded = decoder(hall=service.hall, caps=service.caps)
 print(decoded.dtype.names, decoded[0])

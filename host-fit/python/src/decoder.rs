@@ -1,5 +1,6 @@
 //! Poses from codes, by the code that runs on the target.
 
+use crate::calibration::{files, from_files};
 use crate::error::{blob_error, log_error, posterior_error, wrong};
 use crate::log::Log;
 use crate::motion::Commanded;
@@ -7,14 +8,11 @@ use crate::rows::Given;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::{LogReading, ReadOptions};
-use host_fit::output::pose_file::KnownErrors;
 use host_fit::output::{blob_file, posterior_file};
 use host_fit::solver::estimator::model::Model;
-use host_fit::solver::estimator::parameters::FieldParameters;
-use host_fit::solver::estimator::posterior::Posterior;
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
-use rayon::prelude::*;
+use pyo3::types::PyTuple;
 use runtime::{
     AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading, Status,
 };
@@ -33,17 +31,33 @@ const FIELDS: [(&str, &str); WORDS] = [
     ("ry_rad", "<f4"),
     ("status", "<u4"),
 ];
-/// So many rows are decoded without a look at signals: some ten milliseconds.
-const ROWS_AT_ONCE: usize = 1 << 18;
+/// So many rows are decoded without a look at signals.
+pub const ROWS_AT_ONCE: usize = 1 << 16;
 
 /// Decodes as the controller does, bit for bit: equations (31) to (33) of the paper, or the field model.
 ///
-/// `Decoder.open("params.bin")` reads a parameter blob; `Calibration.decoder()` gives the decoder of a fit.
+/// `Decoder.load("params.bin")` reads a parameter blob; `Calibration.decoder()` gives the decoder of a fit.
+///
+/// A call gives the pose of each row, as a structured array, (n,): `x_m`, `y_m`, `rz_rad`, `z_m`, `rx_rad`, `ry_rad` in
+/// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). An invalid pose is NaN, with
+/// `invalid="zero"` 0 as on the controller, or the last valid pose for at most `hold` rows.
+///
+/// Give codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers or NaN, (n, 3), a row every
+/// servo period; `mount`, `body`: temperatures, degC, (n,), NaN where there is none. int32 in C order
+/// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
+/// shows as missed frames.
+///
+/// `velocity`, `acceleration`: commanded motion at each row, of X, Y, Rz, (n, 3), m/s, m/s, rad/s, and of X, Y, Rz, Z, Rx,
+/// Ry, (n, 6), m/s2 and rad/s2, in the frame of the pose. The motion correction of the parameters then takes off the errors that
+/// follow motion. Both come from the trajectory, for the sample of the row. A held pose is the last corrected one.
+///
+/// Raises `ValueError` with the name of an argument of wrong shape or dtype, of a motion without the other, and of one
+/// that is not finite or meets parameters without a motion correction.
 #[pyclass(frozen, module = "hallstage")]
 pub struct Decoder {
-    set: ParameterSet,
-    decoder: AnyDecoder,
-    known: Option<StoredPosterior>,
+    pub set: ParameterSet,
+    pub decoder: AnyDecoder,
+    pub known: Option<StoredPosterior>,
 }
 
 impl Decoder {
@@ -62,26 +76,11 @@ impl Decoder {
     ///
     /// Raises `OSError` where it cannot be read, `ValueError` where it is no sound blob.
     #[staticmethod]
-    fn open(path: PathBuf) -> PyResult<Self> {
+    fn load(path: PathBuf) -> PyResult<Self> {
         let (set, known) = read(&path)?;
         Ok(Self::new(set, known))
     }
 
-    /// The pose of each row, as a structured array, (n,): `x_m`, `y_m`, `rz_rad`, `z_m`, `rx_rad`, `ry_rad` in
-    /// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). An invalid pose is NaN, with
-    /// `invalid="zero"` 0 as on the controller, or the last valid pose for at most `hold` rows.
-    ///
-    /// Give codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers or NaN, (n, 3), a row every
-    /// servo period; `mount`, `body`: temperatures, degC, (n,), NaN where there is none. int32 in C order
-    /// is read where it lies. Or give a `log`: all its rows, as `host-fit decode` does; a gap in its times
-    /// shows as missed frames.
-    ///
-    /// `velocity`, `acceleration`: commanded motion at each row, of X, Y, Rz, (n, 3), m/s, m/s, rad/s, and of X, Y, Rz, Z, Rx,
-    /// Ry, (n, 6), m/s2 and rad/s2, in the frame of the pose. The motion correction of the parameters then takes off the errors that
-    /// follow motion. Both come from the trajectory, for the sample of the row. A held pose is the last corrected one.
-    ///
-    /// Raises `ValueError` with the name of an argument of wrong shape or dtype, of a motion without the other, and of one
-    /// that is not finite or meets parameters without a motion correction.
     #[pyo3(signature = (
         log = None, *, hall = None, caps = None, mount = None, body = None, velocity = None, acceleration = None, hold = 0,
         invalid = "nan"
@@ -139,59 +138,6 @@ impl Decoder {
         records(py, words, ("hall", commanded), is_nan)
     }
 
-    /// Standard uncertainty of X, Y, Rz of each row, float64, (n, 3), m, m, rad: by the parameters and by the
-    /// noise of the probes together, at the pose that is decoded; NaN where none is. With `whole` by all sources of the
-    /// budget. Codes and temperatures, or a `log`, as for a call.
-    ///
-    /// Raises `ValueError` without a posterior: of other models than the field model, or where
-    /// `params.bin.posterior` does not stand beside the blob; with `whole` also without a budget in it.
-    #[pyo3(signature = (log = None, *, hall = None, caps = None, mount = None, body = None, whole = false))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "each is named where it is called"
-    )]
-    fn uncertainty<'py>(
-        &self,
-        py: Python<'py>,
-        log: Option<&Bound<'py, Log>>,
-        hall: Option<&Bound<'py, PyAny>>,
-        caps: Option<&Bound<'py, PyAny>>,
-        mount: Option<&Bound<'py, PyAny>>,
-        body: Option<&Bound<'py, PyAny>>,
-        whole: bool,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let known = self.known_errors()?;
-        if whole && known.budget.is_none() {
-            return Err(wrong("whole", "the posterior has no budget; fit again"));
-        }
-        let at = |reading: Reading| {
-            if reading.status.any(Status::PLANAR_INVALID) {
-                return [f64::NAN; 3];
-            }
-            let all = known.at(&reading);
-            [0, 1, 2].map(|k| all[if whole { 3 + k } else { k }])
-        };
-        let decoder = &self.decoder;
-        let found: Vec<[f64; 3]> = match Given::new(log, hall, caps, [mount, body])? {
-            Given::Log(log) => {
-                let found = work::run(py, || {
-                    let mut readings = Vec::new();
-                    let read = log.read_for(ReadOptions::DECODE, |_, row| {
-                        readings.push(row.row.frame.decode(decoder, &PlanarPose::ZERO));
-                    });
-                    read.map(|_: LogReading| readings.into_par_iter().map(at).collect())
-                })?;
-                found.map_err(|error| log_error(py, &error))?
-            }
-            Given::Codes(given) => {
-                let rows = given.rows()?;
-                let of_row = |row| at(decoder.decode(&rows.frame(row), &PlanarPose::ZERO));
-                work::run(py, || (0..rows.len()).into_par_iter().map(of_row).collect())?
-            }
-        };
-        crate::log::rows_of_three(py, found)
-    }
-
     /// Equation of the model: "12", "15", "30", "31", or "field".
     #[getter]
     fn model(&self) -> &'static str {
@@ -210,6 +156,25 @@ impl Decoder {
         &self.set.created
     }
 
+    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let (blob, posterior) = files(py, &self.set, self.known.as_ref())?;
+        work::restored(py, (py.get_type::<Self>(), blob, posterior))
+    }
+
+    #[staticmethod]
+    fn _restore(blob: &[u8], posterior: Option<&[u8]>) -> PyResult<Self> {
+        let (set, known) = from_files(blob, posterior)?;
+        Ok(Self::new(set, known))
+    }
+
     fn __repr__(&self) -> String {
         let (model, serial) = (Model::from_kind(self.set.model).title(), &self.set.serial);
         match serial.as_str() {
@@ -220,40 +185,19 @@ impl Decoder {
 }
 
 impl Decoder {
-    fn known_errors(&self) -> PyResult<KnownErrors> {
-        let parameters = FieldParameters::from_blob(&self.set).ok_or_else(|| {
-            let model = Model::from_kind(self.set.model).name;
-            wrong(
-                "model",
-                format!("({model}) does not know its errors in service; fit the field model"),
-            )
-        })?;
-        let known = self.known.as_ref().ok_or_else(|| {
-            wrong(
-                "posterior",
-                "none stands beside the blob, or the calibration has none",
-            )
-        })?;
-        let covariance = known.covariance.clone();
-        Ok(KnownErrors {
-            posterior: Posterior::from_covariance(covariance, &parameters, &known.noise),
-            budget: known.budget.clone(),
-        })
-    }
-
     /// The words of all rows of a log.
     fn statuses(&self, py: Python<'_>, log: &Log, on_invalid: OnInvalid) -> PyResult<Vec<u32>> {
-        let decoder = &self.decoder;
-        let decoded = work::run(py, || {
-            let mut tracker = PoseTracker::new(decoder, on_invalid);
+        let (decoder, text) = (self.decoder, log.text.clone());
+        let decoded = work::run(py, move |watch| {
+            let mut tracker = PoseTracker::new(&decoder, on_invalid);
             let mut words = Vec::new();
-            let read = log.read_for(ReadOptions::DECODE, |_, row| {
+            let read = text.read(ReadOptions::DECODE, watch, |_, row| {
                 if row.begins {
                     tracker.forget();
                 }
                 let frame = &row.row.frame;
                 let reading =
-                    tracker.tick_with(frame.sequence(), |zero| frame.decode(decoder, zero));
+                    tracker.tick_with(frame.sequence(), |zero| frame.decode(&decoder, zero));
                 words.extend(words_of(&reading));
             });
             read.map(|_: LogReading| words)

@@ -2,8 +2,9 @@
 
 use host_fit::calibrate::CalibrateError;
 use host_fit::calibration::recalibrate::RecalibrateError;
+use host_fit::calibration::words::python;
 use host_fit::input::finding::Finding;
-use host_fit::input::log::{LogError, LogProblem};
+use host_fit::input::log::{CellFault, LogError, LogProblem};
 use host_fit::input::source::SourceProblem;
 use host_fit::input::stage::StageError;
 use host_fit::output::OutputError;
@@ -16,9 +17,14 @@ use pyo3::exceptions::{
 use pyo3::prelude::*;
 use std::fmt::Display;
 
+/// An error in the words of the package.
+fn said(error: impl Display) -> String {
+    python(&error.to_string())
+}
+
 /// A wrong argument, by its name.
 pub fn wrong(argument: &str, problem: impl Display) -> PyErr {
-    PyValueError::new_err(format!("{argument}: {problem}"))
+    PyValueError::new_err(said(format_args!("{argument}: {problem}")))
 }
 
 /// An exception of a class of this package.
@@ -35,13 +41,13 @@ pub fn log_error(py: Python<'_>, error: &LogError) -> PyErr {
     use SourceProblem::{Interrupted, IsFolder, NotFound, Unreadable};
     match &error.problem {
         LogProblem::Source(of @ (Interrupted | NotFound | IsFolder | Unreadable { .. })) => {
-            source_error(of, error.to_string())
+            source_error(of, said(error))
         }
         _ => {
             let place = &error.place;
             let file = Some(place.path.display().to_string()).filter(|file| !file.is_empty());
             let (column, name) = place.column.clone().unzip();
-            let arguments = (error.to_string(), file, place.line, column, name);
+            let arguments = (said(error), file, place.line, column, name);
             own(py, "LogError", arguments)
         }
     }
@@ -57,12 +63,16 @@ pub fn arrays_error(py: Python<'_>, error: &LogError, arguments: &[(String, Stri
     let (Some((_, argument)), Some(row)) = (arguments.iter().find(named), row) else {
         return log_error(py, error);
     };
-    let said = format!("{argument}[{row}]: {}", error.problem);
+    let problem: &dyn Display = match &error.problem {
+        LogProblem::Cell(CellFault::Empty) => &CellFault::Nan,
+        other => other,
+    };
+    let message = said(format_args!("{argument}[{row}]: {problem}"));
     let column = place.column.as_ref().map(|(column, _)| *column);
     own(
         py,
         "LogError",
-        (said, None::<String>, row, column, argument),
+        (message, None::<String>, row, column, argument),
     )
 }
 
@@ -71,7 +81,7 @@ pub fn refused(py: Python<'_>, why: &str, code: Option<&str>, findings: &[Findin
     let made = crate::finding::list(py, findings);
     made.map_or_else(
         |error| error,
-        |findings| own(py, "LogRefused", (why, findings, code)),
+        |findings| own(py, "LogRefused", (said(why), findings, code)),
     )
 }
 
@@ -84,8 +94,8 @@ pub fn calibrate_error(error: &CalibrateError) -> PyErr {
 
 pub fn stage_error(error: &StageError) -> PyErr {
     match error {
-        StageError::Source(source) => source_error(&source.problem, error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
+        StageError::Source(source) => source_error(&source.problem, said(error)),
+        _ => PyValueError::new_err(said(error)),
     }
 }
 
@@ -100,26 +110,26 @@ fn source_error(problem: &SourceProblem, message: String) -> PyErr {
 
 pub fn blob_error(error: &BlobFileError) -> PyErr {
     match error {
-        BlobFileError::Read(source) => source_error(&source.problem, error.to_string()),
-        BlobFileError::Unusable { .. } => PyValueError::new_err(error.to_string()),
+        BlobFileError::Read(source) => source_error(&source.problem, said(error)),
+        BlobFileError::Unusable { .. } => PyValueError::new_err(said(error)),
     }
 }
 
 pub fn posterior_error(error: &PosteriorFileError) -> PyErr {
     match error {
-        PosteriorFileError::Read(source) => source_error(&source.problem, error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
+        PosteriorFileError::Read(source) => source_error(&source.problem, said(error)),
+        _ => PyValueError::new_err(said(error)),
     }
 }
 
 pub fn output_error(error: &OutputError) -> PyErr {
-    PyOSError::new_err(error.to_string())
+    PyOSError::new_err(said(error))
 }
 
 pub fn recalibrate_error(py: Python<'_>, error: &RecalibrateError) -> PyErr {
     match error {
         RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => {
-            PyValueError::new_err(error.to_string())
+            PyValueError::new_err(said(error))
         }
         _ => refused(py, &error.to_string(), None, &[]),
     }

@@ -4,16 +4,17 @@ use crate::choice::chosen;
 use crate::error::{log_error, wrong};
 use crate::finding;
 use crate::log::Log;
-use crate::report::{About, head, residuals, text, write};
+use crate::report::{About, by_axis, head, residuals, text, write, zero_deviations};
 use crate::stage::Stage;
 use crate::work;
 use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated};
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::judge::Zeros;
 use host_fit::calibration::recalibrate::StoredPosterior;
+use host_fit::calibration::words::python;
 use host_fit::input::stage::Stage as Designed;
-use host_fit::report::errors::errors;
 use host_fit::report::result::Report;
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use runtime::ParameterSet;
@@ -50,17 +51,19 @@ impl Evaluation {
             return Err(wrong("limit", "a factor above zero is needed"));
         }
         let order = EvalOrder { zeros, limit };
-        let (designed, logs) = (&log.designed, log.reading.dataset.logs.len());
-        let evaluated = work::run(py, || {
-            Evaluated::new(of_blob, designed, order, logs, |take| {
-                log.read_for(Evaluated::OPTIONS, take)
+        let (text, logs) = (log.text.clone(), log.reading.dataset.logs.len());
+        let (set, known) = (of_blob.0.clone(), of_blob.1.cloned());
+        let evaluated = work::run(py, move |watch| {
+            let of_blob = (&set, known.as_ref());
+            Evaluated::new(of_blob, &text.designed, order, logs, |take| {
+                text.read(Evaluated::OPTIONS, watch, take)
             })
         })?;
         let evaluated = evaluated.map_err(|error| log_error(py, &error))?;
         Ok(Self {
             report: evaluated.report(started.elapsed().as_secs_f64()),
             evaluated,
-            designed: Arc::clone(designed),
+            designed: Arc::clone(&log.text.designed),
             stage: log.stage.clone_ref(py),
             serial: of_blob.0.serial.as_str().to_owned(),
             blob,
@@ -70,16 +73,40 @@ impl Evaluation {
 
 #[pymethods]
 impl Evaluation {
-    /// All figures, as `host-fit eval --json` writes them.
+    /// "good", "limited" or "refused", or None where that is not known.
     #[getter]
-    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        finding::figures(py, &self.evaluated.diagnosis.verdict)
+    }
+
+    /// The stage.
+    #[getter(stage)]
+    fn of_stage(&self, py: Python<'_>) -> Py<Stage> {
+        self.stage.clone_ref(py)
+    }
+
+    /// All figures of `host-fit eval --json` as a dict, in SI.
+    #[getter]
+    fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         finding::figures(py, &self.report)
     }
 
-    /// rms and peak of X, Y, Rz over all rows: um, um, urad.
+    /// rms errors of X, Y, Rz over all rows, a dict, m, m, rad.
     #[getter]
-    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        finding::figures(py, &errors(&self.evaluated.judgement.errors))
+    fn rms(&self) -> BTreeMap<&'static str, f64> {
+        by_axis(self.evaluated.judgement.errors.axes.map(|axis| axis.rms))
+    }
+
+    /// The largest errors of X, Y, Rz over all rows, a dict, m, m, rad.
+    #[getter]
+    fn peak(&self) -> BTreeMap<&'static str, f64> {
+        by_axis(self.evaluated.judgement.errors.axes.map(|axis| axis.peak))
+    }
+
+    /// Zero deviations of the Hall probes A, B, C, a row for each movement: float64, (movements, 3), m.
+    #[getter]
+    fn zero_deviations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        zero_deviations(py, &self.evaluated.judgement)
     }
 
     /// What is wrong with the logs, the most severe first.
@@ -91,13 +118,15 @@ impl Evaluation {
     /// What the user should know besides.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.report.warnings.clone()
+        let warnings = self.report.warnings.iter();
+        warnings.map(|warning| python(warning)).collect()
     }
 
     /// Why the calibration does not describe these logs, and what to do, or None if it does.
     #[getter]
     fn refusal(&self) -> Option<String> {
-        self.evaluated.refusal_message()
+        let message = self.evaluated.refusal_message();
+        message.map(|message| python(&message))
     }
 
     /// The same as a name that stays: "other_log", "beyond_limit" or "findings"; None if it does.

@@ -1,14 +1,17 @@
-//! Findings, and figures in general, on their way to Python: as JSON, which has a name for each.
+//! Findings, and figures in general, on their way to Python: as JSON in SI, which has a name for each.
 
+use crate::error::internal;
+use crate::si;
 use host_fit::calibration::words::Worded;
 use host_fit::input::finding::Finding;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use serde::Serialize;
 
-/// What a report has, as `json.loads` reads it.
+/// What a report has, as `json.loads` reads it, in SI and in the words of the package.
 pub fn figures<'py>(py: Python<'py>, figures: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
-    let text = serde_json::to_string(figures).map_err(crate::error::internal)?;
+    let figures = serde_json::to_value(figures).map_err(internal)?;
+    let text = si::figures(figures).to_string();
     py.import("json")?.call_method1("loads", (text,))
 }
 

@@ -6,11 +6,15 @@
 mod arrays;
 mod calibration;
 mod choice;
+mod columns;
 mod decoder;
 mod error;
 mod evaluation;
 mod finding;
 mod fit;
+mod held;
+mod judged;
+mod known;
 mod log;
 mod minimize;
 mod motion;
@@ -19,8 +23,13 @@ mod plan;
 mod program;
 mod report;
 mod rows;
+mod si;
+mod source;
 mod stage;
 mod statistics;
+mod table;
+mod text;
+mod uncertainty;
 mod work;
 
 use pyo3::prelude::*;
@@ -37,7 +46,7 @@ mod _hallstage {
     #[pymodule_export]
     use crate::fit::{check, fit};
     #[pymodule_export]
-    use crate::log::{Log, read_log};
+    use crate::log::Log;
     #[pymodule_export]
     use crate::minimize::minimize;
     #[pymodule_export]

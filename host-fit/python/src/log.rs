@@ -1,117 +1,110 @@
-//! Logs: from files, and from arrays.
+//! Logs: from files, arrays and frames.
 
-use crate::choice::chosen;
-use crate::error::{arrays_error, log_error, wrong};
-use crate::finding;
+use crate::error::{arrays_error, log_error, output_error, wrong};
+use crate::held::HeldRows;
+use crate::source::{Logs, Source, is_own};
 use crate::stage::Stage;
+use crate::table::csv;
+use crate::text::{How, LogText};
 use crate::work;
 use host_fit::calibration::words;
-use host_fit::input::axis::counted;
-use host_fit::input::channels::columns;
-use host_fit::input::dataset::Row;
-use host_fit::input::log::layout::LogLayout;
-use host_fit::input::log::{
-    self, BadRows, LogError, LogReading, LogRow, ReadOptions, ReferenceUse,
-};
-use host_fit::input::stage::{Stage as Designed, TemperatureTable};
-use host_fit::report::channels::channels;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use host_fit::input::log::{LogError, LogReading, ReadOptions};
+use host_fit::input::text::TextReader;
+use host_fit::input::watch::Watch;
+use host_fit::output::write_atomically;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use runtime::frame::MISSING_CODE;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Where a log can be read again.
-pub enum Source {
-    /// Its files.
-    Files(Vec<PathBuf>),
-    /// The text of a log in memory, and its name.
-    Text(Vec<u8>, PathBuf),
-}
-
 /// Logs of a stage, read and checked: rows in SI units, by movement.
 ///
-/// If there are more than 125,000 rows, it holds a sample, of whole runs; `fit` works on these. `evaluate` and a decoder
-/// go through all rows. Made by `read_log` and `Log.from_arrays`.
+/// Made by `Log.load`, `Log.from_frame` and `Log.from_arrays`. `log[rows]` is the log of some of its rows: a mask, a slice or
+/// numbers of rows. `fit` and `check` work on a sample of a log of more than 125,000 rows; all else works on all rows.
 #[pyclass(frozen, subclass, module = "hallstage")]
 pub struct Log {
     pub reading: Arc<LogReading>,
-    pub source: Source,
-    pub options: ReadOptions,
-    /// The stage with the columns of this log.
-    pub designed: Arc<Designed>,
+    pub text: LogText,
     pub stage: Py<Stage>,
-}
-
-fn options(bad_rows: &str) -> PyResult<ReadOptions> {
-    Ok(ReadOptions {
-        bad_rows: chosen::<BadRows>("bad_rows", bad_rows)?,
-        // A log that is only decoded has none.
-        reference: ReferenceUse::IfPresent,
-        watch: work::WATCH,
-        ..ReadOptions::FIT
-    })
-}
-
-/// Reads logs of a stage, in every form that the program `host-fit` takes: CSV or CSV.gz, any separator,
-/// decimal commas, units in the header, UTF-16, dates as times.
-///
-/// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to count rows with a
-/// bad cell and go on without them.
-///
-/// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
-/// be read.
-#[pyfunction]
-#[pyo3(signature = (paths, stage, *, bad_rows = "refuse"))]
-pub fn read_log(
-    py: Python<'_>,
-    paths: &Bound<'_, PyAny>,
-    stage: Py<Stage>,
-    bad_rows: &str,
-) -> PyResult<Log> {
-    let paths: Vec<PathBuf> = match paths.extract::<PathBuf>() {
-        Ok(one) => vec![one],
-        Err(_) => paths
-            .extract()
-            .map_err(|_| wrong("paths", "a path, or a list of paths, is needed"))?,
-    };
-    if paths.iter().any(|path| path.as_os_str() == "-") {
-        return Err(wrong(
-            "paths",
-            "`-` is no file; read standard input by sys.stdin",
-        ));
-    }
-    let options = options(bad_rows)?;
-    let designed = Arc::clone(&stage.get().designed);
-    let reading = work::run(py, || log::read(&paths, &designed, &options))?;
-    let reading = reading.map_err(|error| log_error(py, &error))?;
-    Ok(Log {
-        reading: Arc::new(reading),
-        source: Source::Files(paths),
-        options,
-        designed,
-        stage,
-    })
+    pub held: Arc<HeldRows>,
 }
 
 #[pymethods]
 impl Log {
+    /// Reads logs of a stage, in every form that the program `host-fit` takes: CSV or CSV.gz, any separator,
+    /// decimal commas, units in the header, UTF-16, dates as times; and in the form of `log.save` and `log.df.to_csv`.
+    ///
+    /// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to count rows with a
+    /// bad cell and go on without them. `rows`: "all", or "sample" to hold the sample that `fit` works on.
+    ///
+    /// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
+    /// be read.
+    #[staticmethod]
+    #[pyo3(signature = (paths, stage, *, bad_rows = "refuse", rows = "all"))]
+    fn load(
+        py: Python<'_>,
+        paths: &Bound<'_, PyAny>,
+        stage: Py<Stage>,
+        bad_rows: &str,
+        rows: &str,
+    ) -> PyResult<Self> {
+        let paths: Vec<PathBuf> = match paths.extract::<PathBuf>() {
+            Ok(one) => vec![one],
+            Err(_) => paths
+                .extract()
+                .map_err(|_| wrong("paths", "a path, or a list of paths, is needed"))?,
+        };
+        if paths.iter().any(|path| path.as_os_str() == "-") {
+            let problem = "`-` is no file; read standard input by sys.stdin";
+            return Err(wrong("paths", problem));
+        }
+        let how = How::new(bad_rows, rows)?;
+        let source = Source::files(paths, &stage.get().designed);
+        Self::read(py, source, stage, how, |error| log_error(py, error))
+    }
+
+    /// A log of a `pandas.DataFrame`, with the columns that a file would have: those of `log.df`, or those that the stage
+    /// names. A named index is a column.
+    ///
+    /// `name` stands for the file in reports; `bad_rows` as for `load`. Raises `LogError` with `.line`, the row from 0, and
+    /// `.name`, the column.
+    #[staticmethod]
+    #[pyo3(signature = (frame, stage, *, name = "frame", bad_rows = "refuse"))]
+    fn from_frame(
+        py: Python<'_>,
+        frame: &Bound<'_, PyAny>,
+        stage: Py<Stage>,
+        name: &str,
+        bad_rows: &str,
+    ) -> PyResult<Self> {
+        let how = How::new(bad_rows, "all")?;
+        let made = py.import("hallstage._arrays")?.getattr("frame_text")?;
+        let (text, columns): (String, Vec<(String, String)>) = made.call1((frame,))?.extract()?;
+        let name = Path::new(name);
+        let reader = TextReader::from_reader(text.as_bytes(), name);
+        let reader = reader.map_err(|error| log_error(py, &error.into()))?;
+        let is_own = is_own(reader, &stage.get().designed.log);
+        let source = Source::text(name, text.into_bytes(), is_own);
+        Self::read(py, source, stage, how, |error| {
+            arrays_error(py, error, &columns)
+        })
+    }
+
     /// A log of arrays, by the checks that files pass.
     ///
-    /// `t_us`: time, us, (n,). `hall`, `caps`: codes of the Hall probes A, B, C and of the gaps 1, 2, 3, whole
+    /// `time`: s, (n,). `hall`, `caps`: codes of the Hall probes A, B, C and of the gaps 1, 2, 3, whole
     /// numbers, (n, 3); in place of `caps` the vertical pose `z`, `rx`, `ry`, (n,). Reference, (n,): the beams
     /// `x`, `y1`, `y2`, or the pose `x`, `y`, `rz`; a log that is only decoded needs none. `movement`: its number,
     /// whole, (n,); without it movements end at gaps in time. `mount`, `body`: temperatures, degC, (n,), NaN
     /// where there is none. `units` of lengths: m, mm, um, nm, pm; `angles`: rad, mrad, urad, nrad, deg.
-    /// `name` stands for the file in reports; `bad_rows` as for `read_log`.
+    /// `name` stands for the file in reports; `bad_rows` as for `load`.
     ///
     /// Raises `ValueError` with the name of an argument of wrong shape, dtype or unit, and `LogError` for a
     /// row, with `.line` the row from 0 and `.name` the argument.
     #[staticmethod]
     #[pyo3(
         signature = (stage, *, name = "arrays", bad_rows = "refuse", **arrays),
-        text_signature = "(stage, *, t_us, hall, caps=None, z=None, rx=None, ry=None, x=None, y1=None, y2=None, y=None, \
+        text_signature = "(stage, *, time, hall, caps=None, z=None, rx=None, ry=None, x=None, y1=None, y2=None, y=None, \
                           rz=None, movement=None, mount=None, body=None, units='m', angles='rad', name='arrays', \
                           bad_rows='refuse')"
     )]
@@ -122,118 +115,33 @@ impl Log {
         bad_rows: &str,
         arrays: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let options = options(bad_rows)?;
-        let made = py.import("hallstage._arrays")?.getattr("log_text")?;
-        let (text, arguments): (String, Vec<(String, String)>) =
+        let how = How::new(bad_rows, "all")?;
+        let made = py.import("hallstage._arrays")?.getattr("log_columns")?;
+        let (columns, arguments): (Bound<'_, PyDict>, Vec<(String, String)>) =
             made.call((), arrays)?.extract()?;
-        let name = Path::new(name);
-        Self::from_text(py, text.as_bytes(), name, stage, &options, &arguments)
+        let source = Source::text(Path::new(name), csv(&columns, None)?, true);
+        Self::read(py, source, stage, how, |error| {
+            arrays_error(py, error, &arguments)
+        })
+    }
+
+    /// Writes the rows as CSV, with the columns of `log.df`; `Log.load` reads it. Raises `OSError` where it cannot be written.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let text = csv(&self.columns(py)?, None)?;
+        write_atomically(&path, &text).map_err(|error| output_error(&error))
+    }
+
+    fn __getitem__(&self, py: Python<'_>, rows: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let text = csv(&self.columns(py)?, Some(rows))?;
+        let name = format!("{}[rows]", self.reading.dataset.logs[0].path.display());
+        let source = Source::text(Path::new(&name), text, true);
+        let stage = self.stage.clone_ref(py);
+        Self::read(py, source, stage, How::WHOLE, |error| log_error(py, error))
     }
 
     /// Rows that are held.
     fn __len__(&self) -> usize {
-        self.reading.dataset.rows.len()
-    }
-
-    /// Rows that were read; more than are held of a long log.
-    #[getter]
-    fn rows_read(&self) -> usize {
-        self.reading.dataset.read().0
-    }
-
-    /// The stage.
-    #[getter]
-    fn stage(&self, py: Python<'_>) -> Py<Stage> {
-        self.stage.clone_ref(py)
-    }
-
-    /// What is odd about the logs, in words.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        words::messages(&self.reading.warnings)
-    }
-
-    /// The properties of each channel, as `host-fit check --json` writes them: a list of dicts.
-    #[getter]
-    fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let dataset = &self.reading.dataset;
-        finding::figures(py, &channels(&columns(dataset, &self.designed), dataset))
-    }
-
-    /// Time of the rows within their log, us: int64, (n,).
-    #[getter]
-    fn t_us<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(py, self.rows().iter().map(|row| row.t_us))
-    }
-
-    /// Number of the movement of the rows: int64, (n,).
-    #[getter]
-    fn movement<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let movements = &self.reading.dataset.movements;
-        PyArray1::from_iter(
-            py,
-            self.rows().iter().map(|row| movements[row.movement].index),
-        )
-    }
-
-    /// Codes of the Hall probes A, B, C: int32, (n, 3).
-    #[getter]
-    fn hall<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
-        rows_of_three(py, self.rows().iter().map(|row| row.frame.hall()))
-    }
-
-    /// Codes of the gaps 1, 2, 3: int32, (n, 3); None of a log that has gaps or the vertical pose itself.
-    #[getter]
-    fn caps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i32>>>> {
-        let codes = self.rows().iter().map(|row| row.frame.capacitive());
-        let codes: Option<Vec<[i32; 3]>> = codes.collect();
-        codes.map(|codes| rows_of_three(py, codes)).transpose()
-    }
-
-    /// X, Y, Rz by the interferometers: float64, (n, 3), m, m, rad; zeros in a log without reference.
-    #[getter]
-    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        rows_of_three(py, self.rows().iter().map(|row| row.reference))
-    }
-
-    /// Z, Rx, Ry by the capacitive sensors: float64, (n, 3), m, rad, rad.
-    #[getter]
-    fn vertical<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        rows_of_three(py, self.rows().iter().map(|row| row.vertical))
-    }
-
-    /// Temperature of the magnets' mount: float64, (n,), degC, NaN where there is none.
-    #[getter]
-    fn mount<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.temperature(py, 0)
-    }
-
-    /// Temperature of the stage body at the Hall elements, as `mount`.
-    #[getter]
-    fn body<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.temperature(py, 1)
-    }
-
-    /// The rows as a `pandas.DataFrame`: number of the log, movement, time, codes, poses, temperatures, in SI
-    /// units but for `t_us` and degC. Needs pandas.
-    #[getter]
-    fn df<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, this) = (slf.py(), slf.get());
-        let movements = &this.reading.dataset.movements;
-        let logs = this
-            .rows()
-            .iter()
-            .map(|row| movements[row.movement].log as i64);
-        let logs = PyArray1::from_iter(py, logs);
-        let has_temperatures = [0, 1].map(|sensor| {
-            let all = 0..this.rows().len();
-            this.reading
-                .dataset
-                .temperature_range_mc(sensor, all)
-                .is_some()
-        });
-        let frame = py.import("hallstage._results")?.getattr("frame")?;
-        frame.call1((slf, logs, this.has_reference(), has_temperatures))
+        self.held.rows.len()
     }
 
     fn __repr__(&self) -> String {
@@ -244,95 +152,108 @@ impl Log {
             .iter()
             .map(|log| log.path.display().to_string());
         let names = names.collect::<Vec<_>>().join(", ");
-        let held = match dataset.rows.len() {
+        let held = match self.held.rows.len() {
             held if held < rows => format!(", {held} of them held"),
             _ => String::new(),
         };
-        let movements = counted(movements, "movement");
+        let movements = host_fit::input::axis::counted(movements, "movement");
         format!("<Log {names}: {rows} rows in {movements}{held}>")
+    }
+
+    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let LogText { source, how, .. } = &self.text;
+        let texts = source.texts()?.into_iter();
+        let texts: Vec<_> = texts
+            .map(|(name, text)| (name, PyBytes::new(py, &text)))
+            .collect();
+        let (bad_rows, rows) = how.words();
+        let stage = self.stage.clone_ref(py);
+        let arguments = (
+            py.get_type::<Self>(),
+            texts,
+            source.is_own,
+            stage,
+            bad_rows,
+            rows,
+        );
+        work::restored(py, arguments)
+    }
+
+    #[staticmethod]
+    fn _restore(
+        py: Python<'_>,
+        texts: Vec<(PathBuf, Vec<u8>)>,
+        is_own: bool,
+        stage: Py<Stage>,
+        bad_rows: &str,
+        rows: &str,
+    ) -> PyResult<Self> {
+        let source = Source {
+            logs: Logs::Texts(texts),
+            is_own,
+        };
+        let how = How::new(bad_rows, rows)?;
+        Self::read(py, source, stage, how, |error| log_error(py, error))
     }
 }
 
-/// Columns of temperatures in a log of arrays, and in a table.
-const MOUNT: &str = "mount_c";
-const BODY: &str = "body_c";
-
 impl Log {
-    /// A log from its text, and where its columns come from if arrays made it: name in the header and name
-    /// of the argument.
-    pub fn from_text(
+    /// Reads logs; `raised` is the exception for an error.
+    pub fn read(
         py: Python<'_>,
-        text: &[u8],
-        name: &Path,
+        source: Source,
         stage: Py<Stage>,
-        options: &ReadOptions,
-        arguments: &[(String, String)],
+        how: How,
+        raised: impl FnOnce(&LogError) -> PyErr,
     ) -> PyResult<Self> {
-        let base = &stage.get().designed;
-        // The columns of arrays have their own names.
-        let mut layout = LogLayout::default();
-        // Temperatures are none of its quantities.
-        layout.ignored = vec![MOUNT.to_owned(), BODY.to_owned()];
-        let designed = Arc::new(Designed {
-            log: layout,
-            temperature: TemperatureTable {
-                columns: [Some(MOUNT.to_owned()), Some(BODY.to_owned())],
-                scale_mc: [1e3, 0.0],
-                ..base.temperature.clone()
-            },
-            ..Designed::clone(base)
-        });
-        let reading = work::run(py, || log::read_bytes(text, name, &designed, options))?;
-        let reading = reading.map_err(|error| arrays_error(py, &error, arguments))?;
+        let text = LogText::new(source, &stage.get().designed, how);
+        let again = text.clone();
+        let read = work::run(py, move |watch| {
+            let mut all = HeldRows::default();
+            // A log that is only decoded has no reference.
+            let reading = text.read(ReadOptions::SENSORS, watch, |log, row| {
+                if !how.is_sample {
+                    all.take(log, row);
+                }
+            })?;
+            let held = if how.is_sample {
+                HeldRows::of(&reading.dataset)
+            } else {
+                all
+            };
+            Ok((reading, held))
+        })?;
+        let (reading, held) = read.map_err(|error| raised(&error))?;
         Ok(Self {
             reading: Arc::new(reading),
-            source: Source::Text(text.to_vec(), name.to_owned()),
-            options: *options,
-            designed,
+            text: again,
             stage,
+            held: Arc::new(held),
         })
     }
 
-    fn rows(&self) -> &[Row] {
-        &self.reading.dataset.rows
-    }
-
-    fn temperature<'py>(&self, py: Python<'py>, sensor: usize) -> Bound<'py, PyArray1<f64>> {
-        let celsius = |row: &Row| match row.frame.temperature_mc()[sensor] {
-            MISSING_CODE => f64::NAN,
-            code => f64::from(code) * 1e-3,
-        };
-        PyArray1::from_iter(py, self.rows().iter().map(celsius))
-    }
-
-    pub fn has_reference(&self) -> bool {
-        self.reading
-            .dataset
-            .logs
-            .iter()
-            .all(|log| log.has_reference)
-    }
-
-    /// Reads the log again for a command, with the options of the user; `take` gets every row with the number
-    /// of its log.
-    ///
-    /// # Errors
-    /// See [`LogError`].
-    pub fn read_for(
-        &self,
-        command: ReadOptions,
-        take: impl FnMut(usize, &LogRow),
-    ) -> Result<LogReading, LogError> {
-        let options = &ReadOptions {
-            bad_rows: self.options.bad_rows,
-            watch: self.options.watch,
-            ..command
-        };
-        let stage = &self.designed;
-        match &self.source {
-            Source::Files(paths) => log::read_each(paths, stage, options, take),
-            Source::Text(text, name) => log::read_each_of_bytes(text, name, stage, options, take),
+    /// The same log.
+    pub fn clone_ref(&self, py: Python<'_>) -> Self {
+        Self {
+            reading: Arc::clone(&self.reading),
+            text: self.text.clone(),
+            stage: self.stage.clone_ref(py),
+            held: Arc::clone(&self.held),
         }
+    }
+
+    /// Whether all logs hold the interferometers' reference.
+    pub fn has_reference(&self) -> bool {
+        let mut logs = self.reading.dataset.logs.iter();
+        logs.all(|log| log.has_reference)
     }
 
     /// Raises the error of a log without reference, where one is needed.
@@ -340,19 +261,18 @@ impl Log {
         if self.has_reference() {
             return Ok(());
         }
-        match self.read_for(ReadOptions::FIT, |_, _| ()) {
+        match self.text.read(ReadOptions::FIT, Watch::NONE, |_, _| ()) {
             Ok(_) => Ok(()),
             Err(error) => Err(log_error(py, &error)),
         }
     }
-}
 
-/// An array of rows of three.
-pub fn rows_of_three<'py, T: numpy::Element + Copy>(
-    py: Python<'py>,
-    rows: impl IntoIterator<Item = [T; 3]>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let flat: Vec<T> = rows.into_iter().flatten().collect();
-    let rows = flat.len() / 3;
-    PyArray1::from_vec(py, flat).reshape([rows, 3])
+    /// The messages of its warnings.
+    pub fn warnings(&self) -> Vec<String> {
+        let messages = words::messages(&self.reading.warnings);
+        messages
+            .iter()
+            .map(|message| words::python(message))
+            .collect()
+    }
 }

@@ -3,12 +3,13 @@
 use crate::arrays::{slice, table};
 use crate::choice::chosen;
 use crate::error::{internal, log_error, output_error, wrong};
-use crate::log::{Log, Source};
+use crate::log::Log;
 use crate::minimize::whole;
+use crate::source::Source;
 use crate::stage::Stage;
+use crate::text::How;
 use crate::work;
 use host_fit::calibration::plan::{self, PERIODS_MAX, SECONDS_MAX};
-use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage as Designed;
 use host_fit::input::text::TextReader;
 use host_fit::output::write_atomically;
@@ -22,6 +23,7 @@ use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{RecordError, record_stage};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -55,9 +57,9 @@ impl Plan {
     }
 
     /// Amplitudes, frequencies, speeds, errors predicted for service and standard errors of the parameters: the
-    /// JSON of `host-fit plan` as a dict.
+    /// JSON of `host-fit plan` as a dict, in SI.
     #[getter]
-    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         crate::finding::figures(py, &figures(&self.plan, &[], &self.designed))
     }
 
@@ -87,7 +89,8 @@ pub fn plan_run(py: Python<'_>, stage: PyRef<'_, Stage>, seconds: f64) -> PyResu
         let problem = format!("a number above 0 and up to {most} is needed, not {seconds}");
         return Err(wrong("seconds", problem));
     }
-    let planned = work::run(py, || plan::plan(&designed, seconds))?;
+    let of_plan = Arc::clone(&designed);
+    let planned = work::run(py, move |_| plan::plan(&of_plan, seconds))?;
     let plan = planned.map_err(|error| wrong("seconds", error))?;
     Ok(Plan { plan, designed })
 }
@@ -124,29 +127,46 @@ pub fn simulate<'py>(
     if hour.is_some_and(|hour| !(-24.0..=24.0).contains(&hour)) {
         return Err(wrong("hour", "-24 to 24 h of the day are possible"));
     }
-    let recorded = work::run(py, || {
+    let recorded = work::run(py, move |_| {
         let recording = record_stage(&designed, run, hour, MotionEffects::NONE, seed)?;
-        let csv = log_csv(&recording, &designed);
-        let name = Path::new("simulated");
-        let reading = log::read_bytes(csv.as_bytes(), name, &designed, &ReadOptions::FIT);
-        Ok((reading, csv, recording.truth.concat()))
+        Ok((log_csv(&recording, &designed), recording.truth.concat()))
     })?;
-    let (reading, csv, truth) = recorded.map_err(|error: RecordError| match error {
+    let (csv, truth) = recorded.map_err(|error: RecordError| match error {
         RecordError::NoTemperature => wrong("hour", error),
         error => wrong("run", error),
     })?;
-    let log = Log {
-        reading: Arc::new(reading.map_err(|error| log_error(py, &error))?),
-        source: Source::Text(csv.into_bytes(), "simulated".into()),
-        options: ReadOptions::FIT,
-        designed,
-        stage,
-    };
-    let truth = poses(py, &truth)?.unbind();
-    Bound::new(
-        py,
-        PyClassInitializer::from(log).add_subclass(SimulatedLog { truth }),
-    )
+    let source = Source::text(Path::new("simulated"), csv.into_bytes(), false);
+    let log = Log::read(py, source, stage, How::WHOLE, |error| log_error(py, error))?;
+    SimulatedLog::of(py, log, poses(py, &truth)?.unbind())
+}
+
+#[pymethods]
+impl SimulatedLog {
+    fn __reduce__<'py>(slf: PyRef<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let log = Bound::new(py, slf.as_super().clone_ref(py))?;
+        work::restored(py, (py.get_type::<Self>(), log, slf.truth.clone_ref(py)))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_restore")]
+    fn restore_simulated<'py>(
+        log: &Bound<'py, Log>,
+        truth: Py<PyArray2<f64>>,
+    ) -> PyResult<Bound<'py, Self>> {
+        let py = log.py();
+        Self::of(py, log.get().clone_ref(py), truth)
+    }
+}
+
+impl SimulatedLog {
+    /// A log with its true poses.
+    fn of(py: Python<'_>, log: Log, truth: Py<PyArray2<f64>>) -> PyResult<Bound<'_, Self>> {
+        Bound::new(
+            py,
+            PyClassInitializer::from(log).add_subclass(Self { truth }),
+        )
+    }
 }
 
 fn read_seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {

@@ -1,8 +1,10 @@
 //! What calibrations and evaluations show alike: verdict and findings in a notebook, residuals, a page.
 
 use crate::error::{internal, output_error, wrong};
-use crate::log::rows_of_three;
-use host_fit::calibration::words::message;
+use crate::held::rows_of_three;
+use host_fit::calibration::judge::Judgement;
+use host_fit::calibration::words::{message, python};
+use host_fit::input::axis::PLANAR;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
@@ -13,7 +15,7 @@ use host_fit::report::page::{Source, facts};
 use host_fit::report::provenance::Provenance;
 use host_fit::report::result::Report;
 use host_fit::report::verdict::{Subject, Summary};
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -31,14 +33,14 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
         warnings,
         sections: Vec::new(),
     };
-    page.head().map_err(internal)
+    page.head().map(|head| python(&head)).map_err(internal)
 }
 
 /// The same in words, for a terminal.
 pub fn text(subject: &Subject) -> String {
     let findings = subject.diagnosis.findings.iter();
     let messages = findings.map(|found| message(found) + "\n");
-    Summary::new(subject).as_text() + &messages.collect::<String>()
+    python(&(Summary::new(subject).as_text() + &messages.collect::<String>()))
 }
 
 /// Errors of the rows of a dataset (m, m, rad) as a `hallstage.Residuals`.
@@ -49,17 +51,33 @@ pub fn residuals<'py>(
     weights: Option<&[f64]>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let rows = dataset.rows.iter();
-    let time = PyArray1::from_iter(py, rows.clone().map(|row| row.t_us as f64 * 1e-6));
+    let time = PyArray1::from_iter(py, rows.clone().map(|row| row.t_us as f64 / 1e6));
     let movement = rows.map(|row| dataset.movements[row.movement].index);
     let movement = PyArray1::from_iter(py, movement);
     let axes = errors.iter().map(|error| error.unwrap_or([f64::NAN; 3]));
-    let axes = rows_of_three(py, axes)?.transpose()?;
+    let axes = rows_of_three(py, axes.collect())?.transpose()?;
     let weight = match weights {
         Some(weights) => PyArray1::from_slice(py, weights),
         None => PyArray1::from_vec(py, vec![1.0; errors.len()]),
     };
     let class = py.import("hallstage._results")?.getattr("Residuals")?;
     class.call1((time, movement, axes, weight))
+}
+
+/// Zero deviations of the probes of each movement, m.
+pub fn zero_deviations<'py>(
+    py: Python<'py>,
+    judgement: &Judgement,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    rows_of_three(
+        py,
+        judgement.zeros.iter().map(|zero| zero.delta_m).collect(),
+    )
+}
+
+/// Errors of X, Y, Rz by axis.
+pub fn by_axis(errors: [f64; 3]) -> BTreeMap<&'static str, f64> {
+    PLANAR.iter().map(|axis| axis.key).zip(errors).collect()
 }
 
 /// Who says what on a page.

@@ -1,9 +1,10 @@
 //! The stage as designed.
 
 use crate::error::{stage_error, wrong};
+use crate::work::restored;
 use host_fit::input::stage::Stage as Designed;
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyBool, PyDict};
+use pyo3::types::{IntoPyDict, PyBool, PyDict, PyTuple};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -55,13 +56,30 @@ impl Stage {
             let table = serde_json::from_str(&json).map_err(|error| wrong(&name, error))?;
             all.insert(name, table);
         }
-        let text = all.to_string();
-        let designed = Designed::from_toml(&text, Path::new("Stage(...)"));
+        Self::_restore(all.to_string(), None)
+    }
+
+    #[staticmethod]
+    fn _restore(text: String, path: Option<PathBuf>) -> PyResult<Self> {
+        let name = path.as_deref().unwrap_or(Path::new("Stage(...)"));
+        let designed = Designed::from_toml(&text, name).map_err(|error| stage_error(&error))?;
         Ok(Self {
-            designed: Arc::new(designed.map_err(|error| stage_error(&error))?),
+            designed: Arc::new(designed),
             text,
-            path: None,
+            path,
         })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        restored(py, (py.get_type::<Self>(), &self.text, &self.path))
+    }
+
+    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
+        slf
     }
 
     /// Reads a `stage.toml`.

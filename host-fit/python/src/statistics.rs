@@ -1,12 +1,16 @@
 //! What is known of the parameters of a calibration: values, standard errors, covariance.
 
 use crate::finding;
+use crate::si;
 use host_fit::calibration::fit::Fit;
-use host_fit::calibration::recalibrate::StoredPosterior;
+use host_fit::calibration::recalibrate::{StoredPosterior, with_parameters};
 use host_fit::diff::{parameter_changes, pose_difference};
+use host_fit::input::stage::Stage as Designed;
 use host_fit::report::budget;
 use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
 use host_fit::report::result::Report;
+use host_fit::solver::estimator::paper::Parameters;
+use host_fit::solver::estimator::parameters::FieldParameters;
 use host_fit::solver::estimator::terms;
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -14,6 +18,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
 use runtime::ParameterSet;
+use runtime::calibration::Origin;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -25,14 +30,71 @@ pub struct Statistics<'a> {
 }
 
 impl Statistics<'_> {
-    /// Names and covariance of the parameters that have a standard error.
+    /// Names and covariance of the parameters that have a standard error, SI.
     fn covariance(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
-        if let Some((_, fit)) = self.fit {
-            let posterior = &fit.estimate.posterior;
-            return Some((posterior.names(), posterior.covariance.clone()));
+        let (names, mut covariance) = match self.fit {
+            Some((_, fit)) => {
+                let posterior = &fit.estimate.posterior;
+                (posterior.names(), posterior.covariance.clone())
+            }
+            None => {
+                let covariance = self.known?.covariance.clone();
+                (terms::names(covariance.nrows()), covariance)
+            }
+        };
+        let all = self.raw_parameters();
+        for (k, name) in names.iter().enumerate() {
+            let (factor, _) = si::unit(all.get(name).map_or("", |parameter| parameter.unit));
+            covariance.row_mut(k).scale_mut(factor);
+            covariance.column_mut(k).scale_mut(factor);
         }
-        let covariance = self.known?.covariance.clone();
-        Some((terms::names(covariance.nrows()), covariance))
+        Some((names, covariance))
+    }
+
+    /// The parameters by name, in the units of the program.
+    fn raw_parameters(&self) -> BTreeMap<String, Parameter> {
+        let mut all = match self.fit {
+            Some((report, _)) => report.parameters.clone(),
+            None => parameters_in(self.set),
+        };
+        all.extend(temperature_parameters_in(self.set));
+        all
+    }
+
+    /// The blob with other values of some parameters, SI, by name.
+    ///
+    /// # Errors
+    /// An unknown name, or values that make no decoder.
+    pub fn with_values(
+        &self,
+        stage: &Designed,
+        values: &BTreeMap<String, f64>,
+    ) -> Result<ParameterSet, String> {
+        let paper = || FieldParameters::from_model_31(&Parameters::from_set(self.set), stage);
+        let mut parameters = FieldParameters::from_set(self.set, stage).unwrap_or_else(paper);
+        let known = self.raw_parameters();
+        let names = terms::names(usize::MAX);
+        for (name, value) in values {
+            let place = names.iter().position(|known| known == name);
+            let parameter = known.get(name).zip(place);
+            let (parameter, place) =
+                parameter.ok_or_else(|| format!("`{name}` is no parameter of this calibration"))?;
+            let value = value / si::unit(parameter.unit).0;
+            if !value.is_finite() {
+                return Err(format!("{name} must be a finite number"));
+            }
+            match place.checked_sub(terms::COUNT) {
+                None => parameters.probes.as_flattened_mut()[place] = value,
+                Some(k) => parameters.gain_per_k.as_flattened_mut()[k] = value - parameter.value,
+            }
+        }
+        let origin = Origin {
+            serial: self.set.serial.clone(),
+            created: self.set.created.clone(),
+            logs_sha256: self.set.logs_sha256,
+            fit: self.set.fit,
+        };
+        with_parameters(self.set, &parameters, stage, &origin).map_err(|error| error.to_string())
     }
 
     /// What changed since `older`, in parameters and in poses.
@@ -125,17 +187,15 @@ impl Statistics<'_> {
     pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let class = py.import("hallstage._results")?.getattr("Parameter")?;
         let errors = self.standard_errors();
-        let mut all = match self.fit {
-            Some((report, _)) => report.parameters.clone(),
-            None => parameters_in(self.set),
-        };
-        all.extend(temperature_parameters_in(self.set));
+        let mut all = self.raw_parameters();
         let parameters = PyDict::new(py);
         let add = |name: String, parameter: Parameter| {
             let error = parameter
                 .standard_error
                 .or_else(|| errors.get(&name).copied());
-            let made = class.call1((&name, parameter.value, error, parameter.unit))?;
+            let (factor, unit) = si::unit(parameter.unit);
+            let (value, error) = (parameter.value * factor, error.map(|error| error * factor));
+            let made = class.call1((&name, value, error, unit))?;
             parameters.set_item(name, made)
         };
         let order = self.covariance().map(|(names, _)| names);

@@ -1,10 +1,12 @@
 //! Long work without the GIL: Ctrl-C ends it, and a notebook shows how far it is.
 
+use crate::error::internal;
 use host_fit::input::watch::Watch;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -13,72 +15,77 @@ const PERIOD: Duration = Duration::from_millis(50);
 /// What takes less is not shown.
 const SHOWN_AFTER: Duration = Duration::from_secs(1);
 
-/// Set by a signal, until the work has ended.
-static STOP: AtomicBool = AtomicBool::new(false);
+/// Flags that end work, free for the next work.
+static FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
 /// The work in hand, how many of its steps are done, and their number.
 static CURRENT: Mutex<Option<(&str, u64, u64)>> = Mutex::new(None);
 
-/// How all work is watched.
-pub const WATCH: Watch<'static> = Watch {
-    stop: &STOP,
-    report: |work, done, steps| {
-        *CURRENT.lock().unwrap_or_else(PoisonError::into_inner) = Some((work, done, steps));
-    },
-};
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
-/// Does `work` in a thread of its own. The calling thread looks for signals and shows the progress.
+/// Does `work` in a thread of its own. The calling thread looks for signals and shows the progress. After a signal it goes
+/// on at once: the flag of the watch is set, and the work ends when it looks at the flag.
 ///
 /// # Errors
-/// What a signal raises, such as `KeyboardInterrupt`. The work has ended then, without a result.
-pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+/// What a signal raises, such as `KeyboardInterrupt`.
+pub fn run<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(Watch<'static>) -> T + Send + 'static,
+) -> PyResult<T> {
+    let free = locked(&FLAGS).pop();
+    let stop = free.unwrap_or_else(|| Box::leak(Box::new(AtomicBool::new(false))));
+    let watch = Watch {
+        stop,
+        report: |work, done, steps| *locked(&CURRENT) = Some((work, done, steps)),
+    };
     let (done, wait) = channel();
     let started = Instant::now();
-    let watched = py.detach(move || {
-        thread::scope(|scope| {
-            scope.spawn(move || {
-                let _ = done.send(work());
-            });
-            let mut raised = None;
-            let made = loop {
-                match wait.recv_timeout(PERIOD) {
-                    Ok(made) => break Some(made),
-                    Err(RecvTimeoutError::Disconnected) => break None,
-                    Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
-                    Err(RecvTimeoutError::Timeout) => {
-                        let is_long = started.elapsed() > SHOWN_AFTER;
-                        let looked = Python::attach(|py| {
-                            py.check_signals()?;
-                            if is_long { show(py) } else { Ok(()) }
-                        });
-                        raised = looked.err();
-                        if raised.is_some() {
-                            STOP.store(true, Ordering::Relaxed);
-                        }
-                    }
+    thread::Builder::new().spawn(move || done.send(work(watch)))?;
+    let made = py.detach(move || {
+        loop {
+            match wait.recv_timeout(PERIOD) {
+                Ok(made) => return Ok(made),
+                // The work has panicked.
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(internal("the work ended without a result"));
                 }
-            };
-            (made, raised)
-        })
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| {
+                    py.check_signals()?;
+                    if started.elapsed() > SHOWN_AFTER {
+                        show(py)?;
+                    }
+                    Ok::<(), PyErr>(())
+                })?,
+            }
+        }
     });
-    let (made, raised) = watched;
     if started.elapsed() > SHOWN_AFTER {
         py.import("hallstage._progress")?.call_method0("end")?;
     }
-    if let Some(raised) = raised {
-        STOP.store(false, Ordering::Relaxed);
-        return Err(raised);
+    match made {
+        Ok(_) => locked(&FLAGS).push(stop),
+        Err(_) => stop.store(true, Ordering::Relaxed),
     }
-    // Without a result the work has panicked, and `scope` with it.
-    made.ok_or_else(|| crate::error::internal("the work ended without a result"))
+    made
 }
 
 /// Shows how far the work is, where somebody sees it.
 fn show(py: Python<'_>) -> PyResult<()> {
-    let current = *CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
+    let current = *locked(&CURRENT);
     let Some((what, done, total)) = current else {
         return Ok(());
     };
     let module = py.import("hallstage._progress")?;
     module.call_method1("show", (what, done, total))?;
     Ok(())
+}
+
+/// What `__reduce__` gives: a class makes the object again by its `_restore`, from these arguments after the class.
+pub fn restored<'py>(
+    py: Python<'py>,
+    arguments: impl IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let restored = py.import("hallstage._results")?.getattr("restored")?;
+    (restored, arguments).into_pyobject(py)
 }

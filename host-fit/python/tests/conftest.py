@@ -1,8 +1,9 @@
 """What the tests share: the shipped logs, a calibration of one, the program beside the package."""
 
+import shutil
 import signal
 import subprocess
-import sys
+import sysconfig
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import hallstage as hs
 import pytest
 
 DATA = Path(__file__).parents[2] / "data"
+#: The program of the wheel.
+PROGRAM = str(shutil.which("host-fit", path=sysconfig.get_path("scripts")))
 HostFit = Callable[..., Path]
 
 
@@ -26,12 +29,12 @@ def stage() -> hs.Stage:
 
 @pytest.fixture(scope="session")
 def run30(stage: hs.Stage) -> hs.Log:
-    return hs.read_log(DATA / "run30.csv.gz", stage)
+    return hs.Log.load(DATA / "run30.csv.gz", stage)
 
 
 @pytest.fixture(scope="session")
 def service(stage: hs.Stage) -> hs.Log:
-    return hs.read_log(DATA / "service.csv.gz", stage)
+    return hs.Log.load(DATA / "service.csv.gz", stage)
 
 
 @pytest.fixture(scope="session")
@@ -43,8 +46,7 @@ def program_in(folder: Path) -> HostFit:
     """Runs the program in a folder, which it gives."""
 
     def run(*arguments: str | Path) -> Path:
-        program = Path(sys.executable).parent / "host-fit"
-        subprocess.run([program, "-q", *arguments], cwd=folder, check=True)
+        subprocess.run([PROGRAM, "-q", *arguments], cwd=folder, check=True)
         return folder
 
     return run
@@ -71,4 +73,4 @@ def coils(tmp_path_factory: pytest.TempPathFactory, stage: hs.Stage) -> Path:
 @pytest.fixture(scope="session")
 def in_motion(coils: Path, stage: hs.Stage) -> hs.Calibration:
     """The calibration of a stage with coils and late probes."""
-    return hs.fit(hs.read_log(coils / "run.csv.gz", stage), model="field")
+    return hs.fit(hs.Log.load(coils / "run.csv.gz", stage), model="field")

@@ -34,7 +34,7 @@ def calls(
     x, y, rz = run30.reference[:ROWS].T
     hall, caps = run30.hall[:ROWS], run30.caps[:ROWS] if run30.caps is not None else None
     arrays = {
-        "stage": stage, "t_us": run30.t_us[:ROWS], "hall": hall, "caps": caps, "x": x, "y": y, "rz": rz,
+        "stage": stage, "time": run30.time[:ROWS], "hall": hall, "caps": caps, "x": x, "y": y, "rz": rz,
         "movement": run30.movement[:ROWS], "mount": np.full(ROWS, 20.0), "body": np.full(ROWS, 20.0),
         "units": "m", "angles": "rad", "name": "a", "bad_rows": "refuse",
     }  # fmt: skip
@@ -44,7 +44,7 @@ def calls(
     fit = {
         "log": log, "model": "31", "solver": "lm", "project": "linear", "loss": "none", "train": 100,
         "draw": "plain", "population": 10, "generations": 2, "seed": 1, "serial": "a",
-        "created": "b", "limit": "x=1um", "force": False,
+        "created": "b", "limit": {"x": 1e-6}, "force": False,
     }  # fmt: skip
     tables = {
         "hall": {"h1x_m": 0.2}, "capacitive": {"m_per_count": 1e-8}, "interferometer": {"y_baseline_m": 0.1},
@@ -61,18 +61,22 @@ def calls(
     return [
         (hs.Stage.load, {"path": DATA / "stage.toml"}),
         (hs.Stage, tables),
-        (hs.read_log, {"paths": DATA / "run30.csv.gz", "stage": stage, "bad_rows": "skip"}),
+        (hs.Log.load, {"paths": DATA / "run30.csv.gz", "stage": stage, "bad_rows": "skip", "rows": "all"}),
+        (hs.Log.from_frame, {"frame": log.df, "stage": stage, "name": "a", "bad_rows": "skip"}),
+        (log.save, {"path": folder / "l.csv"}),
+        (log.__getitem__, {"rows": slice(9)}),
         (hs.Log.from_arrays, arrays),
         (hs.check, {"log": log}),
         (hs.fit, fit),
-        (hs.Calibration.open, {"path": folder / "p.bin", "stage": stage}),
+        (hs.Calibration.load, {"path": folder / "p.bin", "stage": stage}),
         (cal.save, {"path": folder / "q.bin"}),
         (cal.evaluate, {"log": log, "delta": "fit", "limit": 1.0}),
         (cal.recalibrate, {"log": log, "what": "gain", "created": "c"}),
         (cal.diff, {"older": cal}),
+        (cal.with_parameters, {"values": {"eta_a": 0.9}}),
         (cal.report, {"path": folder / "r.html", "operator": "me", "notes": {"a": "b"}}),
         (cal.residuals().asd, {"axis": "x"}),
-        (hs.Decoder.open, {"path": folder / "p.bin"}),
+        (hs.Decoder.load, {"path": folder / "p.bin"}),
         (decoder, decode),
         (decoder.uncertainty, {"hall": hall, "caps": caps, "mount": np.zeros(ROWS), "body": np.zeros(ROWS)}),
         (hs.plan, {"stage": stage, "seconds": 4.0}),

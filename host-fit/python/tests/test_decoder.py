@@ -19,7 +19,7 @@ def bits(poses: np.ndarray) -> np.ndarray:
 def test_it_is_the_decoder_of_the_program_bit_for_bit(
     stage: hs.Stage, run30: hs.Log, host_fit: HostFit, tmp_path: Path, model: str
 ) -> None:
-    paper = hs.read_log(DATA / "paper.csv.gz", stage)
+    paper = hs.Log.load(DATA / "paper.csv.gz", stage)
     assert len(paper) == 57_000
     hs.fit(run30, model=model).save(tmp_path / "p.bin")  # type: ignore[arg-type]
     host_fit(
@@ -27,7 +27,7 @@ def test_it_is_the_decoder_of_the_program_bit_for_bit(
         "--format", "npy",
     )  # fmt: skip
     wanted = np.load(tmp_path / "pose.npy")
-    dec = hs.Decoder.open(tmp_path / "p.bin")
+    dec = hs.Decoder.load(tmp_path / "p.bin")
     assert dec.model == model
     assert paper.caps is not None
     of_arrays = dec(hall=paper.hall, caps=paper.caps, invalid="zero")
@@ -85,7 +85,7 @@ def test_uncertainties_are_those_of_the_program_and_cover_the_errors(
         "--format", "npy", "--uncertainty",
     )  # fmt: skip
     wanted = np.load(tmp_path / "pose.npy")
-    dec = hs.Decoder.open(tmp_path / "p.bin")
+    dec = hs.Decoder.load(tmp_path / "p.bin")
     assert service.caps is not None
     u = dec.uncertainty(hall=service.hall, caps=service.caps)
     assert np.allclose(dec.uncertainty(service), u, rtol=1e-12)
@@ -110,7 +110,7 @@ def test_a_blob_without_posterior_has_no_uncertainty(
         hs.fit(run30, model="31").decoder().uncertainty(run30)
     (tmp_path / "p.bin").write_bytes(cal.blob)
     with pytest.raises(ValueError, match="posterior"):
-        hs.Decoder.open(tmp_path / "p.bin").uncertainty(run30)
+        hs.Decoder.load(tmp_path / "p.bin").uncertainty(run30)
 
 
 def test_temperatures_are_read_where_parameters_want_them(cal: hs.Calibration, run30: hs.Log) -> None:
@@ -137,7 +137,7 @@ def test_a_wrong_argument_is_named(cal: hs.Calibration, run30: hs.Log, tmp_path:
         with pytest.raises(ValueError, match=words):
             dec(**wrong)
     with pytest.raises(FileNotFoundError):
-        hs.Decoder.open(tmp_path / "none.bin")
+        hs.Decoder.load(tmp_path / "none.bin")
     (tmp_path / "p.bin").write_bytes(cal.blob[:-1])
     with pytest.raises(ValueError, match=r"p\.bin"):
-        hs.Decoder.open(tmp_path / "p.bin")
+        hs.Decoder.load(tmp_path / "p.bin")

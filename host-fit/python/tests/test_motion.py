@@ -18,7 +18,7 @@ def planar(poses: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def fast(coils: Path, stage: hs.Stage) -> hs.Log:
-    return hs.read_log(coils / "fast.csv.gz", stage)
+    return hs.Log.load(coils / "fast.csv.gz", stage)
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +34,14 @@ def commanded(coils: Path, fast: hs.Log) -> dict[str, Any]:
 
 
 def test_a_fit_shows_lags_and_accelerations_with_their_errors(in_motion: hs.Calibration) -> None:
-    assert in_motion.figures is not None
-    found = in_motion.figures["probe_motion"]
-    assert np.all(np.abs(np.array(found["lag_us"]) - [200, 0, -200]) < 4 * np.array(found["standard_error_us"]))
-    by_acceleration = np.abs(found["by_acceleration_um_per_m_per_s2"])
-    assert by_acceleration.max() > 5
-    assert np.all(np.array(found["standard_error_um_per_m_per_s2"]) < 1)
+    assert in_motion.details is not None
+    found = in_motion.details["probe_motion"]
+    assert np.all(np.abs(np.array(found["lag_s"]) - [2e-4, 0, -2e-4]) < 4 * np.array(found["standard_error_s"]))
+    by_acceleration = np.abs(found["by_acceleration_m_per_m_per_s2"])
+    assert by_acceleration.max() > 5e-6
+    assert np.all(np.array(found["standard_error_m_per_m_per_s2"]) < 1e-6)
     # More than what would leave it good.
-    assert in_motion.figures["valid_up_to"]["acceleration_m_s2"] < 0.1 and in_motion.verdict == "limited"
+    assert in_motion.details["valid_up_to"]["acceleration_m_s2"] < 0.1 and in_motion.verdict == "limited"
 
 
 def test_fast_moves_have_the_errors_that_an_evaluation_expects(
@@ -57,16 +57,16 @@ def test_fast_moves_have_the_errors_that_an_evaluation_expects(
 
     bare, corrected = rms(dec(fast)), rms(dec(fast, **commanded))
     assert np.all(corrected < 0.5 * bare)
-    of = in_motion.evaluate(fast).figures["errors_corrected"]
-    expected = [of["x"]["rmse_um"], of["y"]["rmse_um"], of["rz"]["rmse_urad"]]
-    assert np.allclose(corrected * 1e6, expected, rtol=0.05)
+    of = in_motion.evaluate(fast).details["errors_corrected"]
+    expected = [of["x"]["rmse_m"], of["y"]["rmse_m"], of["rz"]["rmse_rad"]]
+    assert np.allclose(corrected, expected, rtol=0.05)
 
 
 def test_the_correction_is_that_of_the_controller_bit_for_bit(
     in_motion: hs.Calibration, fast: hs.Log, commanded: dict[str, Any]
 ) -> None:
-    assert in_motion.figures is not None
-    of = in_motion.figures["probe_motion"]["correction"]
+    assert in_motion.details is not None
+    of = in_motion.details["probe_motion"]["correction"]
     dec = in_motion.decoder()
     wanted = planar(dec(fast))
     for matrix, motion in [("acceleration_s2", "acceleration"), ("velocity_s", "velocity")]:

@@ -24,7 +24,7 @@ def test_plan_and_rehearsal_are_those_of_the_program(stage: hs.Stage, tmp_path: 
     assert repr(ours).replace("µ", "u") in done.stdout.replace("µ", "u")
     assert (tmp_path / "ours.csv").read_bytes() == run.read_bytes()
     host_fit("simulate", *of_stage, "--plan", run, "--seed", "3", "--out", log, "--truth", truth)
-    simulated, read = hs.simulate(stage, ours, seed=3), hs.read_log(log, stage)
+    simulated, read = hs.simulate(stage, ours, seed=3), hs.Log.load(log, stage)
     assert (simulated.hall == read.hall).all() and (simulated.reference == read.reference).all()
     written = np.loadtxt(truth, delimiter=",", skiprows=1)[:, 2:] * 1e-9
     np.testing.assert_allclose(simulated.truth, written, rtol=0, atol=1e-11)
@@ -35,7 +35,7 @@ def test_plan_and_rehearsal_are_those_of_the_program(stage: hs.Stage, tmp_path: 
 def test_a_rehearsal_predicts_a_good_calibration(stage: hs.Stage) -> None:
     plan = hs.plan(stage, seconds=20.0)
     assert plan.trajectory.shape == (10_001, 6) and plan.seconds == 20.0
-    assert plan.figures["service"]["x"]["ratio"] < 1.03
+    assert plan.details["service"]["x"]["ratio"] < 1.03
     simulated = hs.simulate(stage, plan)
     assert isinstance(simulated, hs.Log) and simulated.truth.shape == (len(simulated), 6)
     hs.fit(simulated)

@@ -2,16 +2,14 @@
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import hallstage as hs
-
-HOST_FIT = Path(sys.executable).parent / "host-fit"
+from conftest import PROGRAM
 
 
 def host_fit(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([HOST_FIT, *arguments], capture_output=True, text=True)
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True)
 
 
 def test_the_program_prints_its_help_and_explains_wrong_usage() -> None:

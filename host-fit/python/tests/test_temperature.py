@@ -34,16 +34,16 @@ def test_a_calibration_with_temperatures_is_that_of_the_program(toml: Path, host
             "--out", f"{name}.csv",
         )  # fmt: skip
         simulated = hs.simulate(stage, run, seed=3, hour=hour)
-        log = hs.read_log(folder / f"{name}.csv", stage)
+        log = hs.Log.load(folder / f"{name}.csv", stage)
         assert (simulated.hall == log.hall).all() and (simulated.mount == log.mount).all()
     files = [folder / f"{name}.csv" for name in ["cold", "early", "warm"]]
-    cal = hs.fit(hs.read_log(files, stage), model="field", created="2026-11-25")
+    cal = hs.fit(hs.Log.load(files, stage), model="field", created="2026-11-25")
     host_fit(
         "fit", *files, "--stage", toml, "--model", "field", "--out", "p.bin", "--created", "2026-11-25"
     )
     assert cal.blob == (folder / "p.bin").read_bytes()
     cal.save(folder / "own.bin")
-    opened = hs.Calibration.open(folder / "own.bin", stage)
+    opened = hs.Calibration.load(folder / "own.bin", stage)
     for one in [cal, opened]:
         covariance = one.covariance
         assert one.names[-6:] == NAMES and covariance.shape == (87, 87)
@@ -53,12 +53,12 @@ def test_a_calibration_with_temperatures_is_that_of_the_program(toml: Path, host
         # NdFeB loses 0.12 %/K, and the runs are 3 K apart.
         assert all(-2e-3 < one.parameters[name].value < -5e-4 for name in NAMES[::2])
     assert opened.diff(cal)["parameters"]["k_a"]["change"] == 0
-    new = opened.recalibrate(hs.read_log(folder / "later.csv", stage), what="temperature")
+    new = opened.recalibrate(hs.Log.load(folder / "later.csv", stage), what="temperature")
     assert new.diff(opened)["parameters"]["k_a"]["sigma"] is not None
     with pytest.raises(hs.LogRefused, match="fitted to warm.csv"):
-        opened.recalibrate(hs.read_log(folder / "warm.csv", stage), what="temperature")
+        opened.recalibrate(hs.Log.load(folder / "warm.csv", stage), what="temperature")
 
-    warm = hs.read_log(folder / "warm.csv", stage)
+    warm = hs.Log.load(folder / "warm.csv", stage)
     pose = opened.decoder()(hall=warm.hall, caps=warm.caps, mount=warm.mount, body=warm.body)
     host_fit(
         "decode", "p.bin", folder / "warm.csv", "--stage", toml, "--out", "pose.npy", "--format", "npy"

@@ -106,7 +106,7 @@ pub fn add_calibration(
     let blob = blob_file::to_bytes(path, set)?;
     match (known, beside(path)) {
         (Some(known), Some(beside)) => {
-            outputs.add(&beside, &encode(Sha256::digest(&blob).into(), known))?;
+            outputs.add(&beside, &to_bytes(&blob, known))?;
         }
         (None, Some(beside)) => outputs.remove(beside),
         (_, None) => {}
@@ -147,7 +147,8 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; 32], runtime::BlobError> {
     Ok(Sha256::digest(set.to_bytes(&mut buffer)?).into())
 }
 
-fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
+/// The file beside a blob.
+pub fn to_bytes(blob: &[u8], known: &StoredPosterior) -> Vec<u8> {
     let StoredPosterior {
         covariance,
         noise,
@@ -156,7 +157,7 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
     } = known;
     let rows = 0..covariance.nrows();
     let content = Content {
-        blob,
+        blob: Sha256::digest(blob).into(),
         white_mm: noise.white_m.map(|m| m * MM_PER_M),
         drift_mm: noise.drift.map(|m| m * MM_PER_M),
         misfit: *misfit,
@@ -172,8 +173,11 @@ fn encode(blob: [u8; 32], known: &StoredPosterior) -> Vec<u8> {
     bytes
 }
 
-/// The hash of the blob and what is known, or what is wrong.
-fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
+/// The SHA-256 of the blob and what is known.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     let Some(start) = bytes.strip_prefix(MAGIC) else {
         return Err("it does not begin with HALLPOS3".to_owned());
     };
@@ -258,8 +262,11 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let bytes = encode([7; 32], &known());
-        assert_eq!(from_bytes(&bytes), Ok(([7; 32], known())));
+        let bytes = to_bytes(b"blob", &known());
+        assert_eq!(
+            from_bytes(&bytes),
+            Ok((Sha256::digest(b"blob").into(), known()))
+        );
         let repaired = StoredPosterior {
             repaired: vec![
                 "the gain of Hall B changes by 1 µV".to_owned(),
@@ -267,11 +274,17 @@ mod tests {
             ],
             ..known()
         };
-        let bytes = encode([7; 32], &repaired);
-        assert_eq!(from_bytes(&bytes), Ok(([7; 32], repaired)));
+        let bytes = to_bytes(b"blob", &repaired);
+        assert_eq!(
+            from_bytes(&bytes),
+            Ok((Sha256::digest(b"blob").into(), repaired))
+        );
         let with_temperature = known_with_rows(COUNT + 6);
-        let bytes = encode([7; 32], &with_temperature);
-        assert_eq!(from_bytes(&bytes), Ok(([7; 32], with_temperature)));
+        let bytes = to_bytes(b"blob", &with_temperature);
+        assert_eq!(
+            from_bytes(&bytes),
+            Ok((Sha256::digest(b"blob").into(), with_temperature))
+        );
     }
 
     #[test]
@@ -290,7 +303,7 @@ mod tests {
 
     #[test]
     fn what_is_damaged_cut_or_no_covariance_is_refused() {
-        let bytes = encode([7; 32], &known());
+        let bytes = to_bytes(b"blob", &known());
         for place in (0..bytes.len()).step_by(997).chain([9, bytes.len() - 1]) {
             let mut damaged = bytes.clone();
             damaged[place] ^= 0x10;
@@ -305,7 +318,7 @@ mod tests {
             known.covariance[(3, 2)] = value;
             known.covariance[(2, 3)] = value;
             known.covariance[(2, 2)] = value.min(1e-12);
-            let sound = from_bytes(&encode([7; 32], &known));
+            let sound = from_bytes(&to_bytes(b"blob", &known));
             assert!(sound.is_err(), "{value}");
         }
     }

@@ -18,7 +18,6 @@ from ._hallstage import (
     fit,
     minimize,
     plan,
-    read_log,
     simulate,
     status_names,
     write_demo,
@@ -51,7 +50,6 @@ __all__ = [
     "fit",
     "minimize",
     "plan",
-    "read_log",
     "simulate",
     "write_demo",
 ]

@@ -51,19 +51,19 @@ _WHOLE = ("iu", "whole numbers", "int64")
 _CODES = ("iu", "codes (whole numbers)", "int32")
 
 
-def log_text(
-    *, t_us: Any, hall: Any, caps: Any = None, z: Any = None, rx: Any = None, ry: Any = None, x: Any = None,
+def log_columns(
+    *, time: Any, hall: Any, caps: Any = None, z: Any = None, rx: Any = None, ry: Any = None, x: Any = None,
     y1: Any = None, y2: Any = None, y: Any = None, rz: Any = None, movement: Any = None, mount: Any = None,
     body: Any = None, units: str = "m", angles: str = "rad",
-) -> tuple[str, list[tuple[str, str]]]:  # fmt: skip
-    """Arrays as the text of a log, which passes all checks of a file; and the argument of each column."""
+) -> tuple[dict[str, NDArray[Any]], list[tuple[str, str]]]:  # fmt: skip
+    """Arrays as the columns of a log, which passes all checks of a file; and the argument of each column."""
     for argument, unit, known in (("units", units, "m mm um nm pm"), ("angles", angles, "rad mrad urad nrad deg")):
         if not isinstance(unit, str) or unit not in known.split():
             raise ValueError(f"{argument}: `{unit}` is none of {', '.join(known.split())}")
     # With a second beam x is a beam, else it is the pose.
     x_key = "x" if y1 is None and y2 is None else "ifm_x"
     forms = [
-        ("t_us", t_us, _REAL, ["t_us"]),
+        ("time", time, _REAL, ["time_s"]),
         ("movement", movement, _WHOLE, ["movement"]),
         ("hall", hall, _CODES, ["hall_a", "hall_b", "hall_c"]),
         ("caps", caps, _CODES, ["cap_1", "cap_2", "cap_3"]),
@@ -75,18 +75,26 @@ def log_text(
         ("mount", mount, _REAL, ["mount_c"]),
         ("body", body, _REAL, ["body_c"]),
     ]
+    columns: dict[str, NDArray[Any]] = {}
     names: list[tuple[str, str]] = []
-    columns: list[list[str]] = []
+    rows = 0
     for argument, given, form, headers in forms:
-        if given is None and argument not in ("t_us", "hall"):
+        if given is None and argument not in ("time", "hall"):
             continue
         array = checked(argument, given, 3 if form is _CODES else None, *form)
-        if columns and len(array) != len(columns[0]):
-            raise ValueError(f"{argument}: {len(array)} rows, but t_us has {len(columns[0])}")
+        rows = rows or len(array)
+        if len(array) != rows:
+            raise ValueError(f"{argument}: {len(array)} rows, but time has {rows}")
         names += [(header, argument) for header in headers]
-        for column in array.reshape(len(array), -1).T.tolist():
-            # A row may have no temperature.
-            empty = "" if argument in ("mount", "body") else "nan"
-            columns.append([empty if number != number or number == MISSING else repr(number) for number in column])
-    header = ",".join(name for name, _ in names)
-    return "\n".join([header, *map(",".join, zip(*columns, strict=True)), ""]), names
+        columns.update(zip(headers, array.reshape(rows, -1).T, strict=True))
+    return columns, names
+
+
+def frame_text(frame: Any) -> tuple[str, list[tuple[str, str]]]:
+    """A `pandas.DataFrame` as the text of a log, and its columns."""
+    if not hasattr(frame, "to_csv") or not hasattr(frame, "columns"):
+        raise ValueError(f"frame: {type(frame).__name__} is no pandas.DataFrame")
+    if len(frame) == 0:
+        raise ValueError("frame: no rows")
+    names = [str(name) for name in frame.columns]
+    return frame.to_csv(index=frame.index.name is not None), [(name, name) for name in names]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class LogRefused(Exception):
     "unfinished"; None for a recalibration that failed.
     """
 
-    def __init__(self, message: str, findings: list[Finding], code: str | None = None) -> None:
+    def __init__(self, message: str, findings: Sequence[Finding] = (), code: str | None = None) -> None:
         super().__init__(message)
-        self.findings = findings
+        self.findings = list(findings)
         self.code = code

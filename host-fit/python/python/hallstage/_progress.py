@@ -2,7 +2,7 @@
 
 import sys
 
-_shown = False
+_shown = ""
 
 
 def _is_seen() -> bool:
@@ -12,11 +12,12 @@ def _is_seen() -> bool:
 
 
 def show(what: str, done: int, total: int) -> None:
-    """Shows that `done` of `total` steps of this are done, in place of what was shown before."""
+    """Shows how many tenths of this work are done, in place of what was shown before."""
     global _shown
-    if _is_seen():
-        _shown = True
-        sys.stderr.write(f"\r{what}: {100 * min(done, total) // total} %   ")
+    text = f"{what}: {10 * (10 * min(done, total) // total)} %"
+    if text != _shown and _is_seen():
+        _shown = text
+        sys.stderr.write(f"\r{text}   ")
         sys.stderr.flush()
 
 
@@ -24,6 +25,6 @@ def end() -> None:
     """Takes away what is shown."""
     global _shown
     if _shown:
-        _shown = False
+        _shown = ""
         sys.stderr.write("\r" + 30 * " " + "\r")
         sys.stderr.flush()

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from html import escape
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Half the width of an interval that covers 95 % of a normal distribution, in standard deviations.
 _COVERS_95 = 1.959963984540054
@@ -25,20 +21,23 @@ def plain(value: Any) -> Any:
     raise ValueError(f"{type(value)} is no value of stage.toml: numbers, texts, lists and dicts are")
 
 
-class OptimizeResult(NamedTuple):
-    """The result of a search, with the fields of SciPy. Made by `minimize`."""
+def restored(cls: Any, *arguments: Any) -> Any:
+    """An object of this package from a pickle."""
+    return cls._restore(*arguments)
 
-    #: Why the search ended.
+
+class OptimizeResult(NamedTuple):
+    """The result of a search, with the fields of SciPy. Made by `minimize`.
+
+    `message`: why the search ended. `success`: whether the smallest value is a finite number. `fun`: the smallest
+    value. `x`: where it is, (n,). `nit`: generations. `nfev`: evaluations of the function.
+    """
+
     message: str
-    #: Whether the smallest value is a finite number.
     success: bool
-    #: The smallest value.
     fun: float
-    #: Where it is, (n,).
     x: NDArray[np.float64]
-    #: Generations.
     nit: int
-    #: Evaluations of the function.
     nfev: int
 
     def __repr__(self) -> str:
@@ -46,39 +45,38 @@ class OptimizeResult(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """One thing that is wrong with a log."""
+    """One thing that is wrong with a log.
 
-    #: What it is: a name that stays, explained in the reference of `host-fit`.
+    `code`: a name that stays, explained in the reference of `host-fit`. `severity`: "note", "warn" or "refuse".
+    `message`: evidence and remedy. `channel`, such as "hall_a", "cap_1", "ifm_y1", "x"; `movement`; `t_s`: when, s in
+    the log; `value`: how large, in `unit`; `cost`: predicted errors in service over the noise floor, with this alone.
+    What does not apply is None.
+    """
+
     code: str
-    #: "note", "warn" or "refuse".
     severity: Literal["note", "warn", "refuse"]
-    #: Evidence and remedy.
     message: str
-    #: The channel, such as "hall_a", "cap_1", "ifm_y1", "x".
     channel: str | None
-    #: The movement.
     movement: str | None
-    #: When, us in the log.
-    t_us: int | None
-    #: How large, in `unit`.
+    t_s: float | None
     value: float | None
     unit: str | None
-    #: Predicted errors in service over the noise floor, with this alone.
     cost: float | None
 
 
 class Findings(list[Finding]):
-    """What is wrong with a log, the most severe first."""
+    """What is wrong with a log, the most severe first: a list of `Finding`.
+
+    `verdict`: "good", "limited" or "refused", of the calibration that the log gives. `refusal`: why the log is refused, and
+    `refusal_code` the same as a name that stays, "no_fit" or "findings"; None where it is not refused.
+    """
 
     def __init__(
         self, findings: list[Finding], verdict: str | None, refusal: str | None, refusal_code: str | None
     ) -> None:
         super().__init__(findings)
-        #: "good", "limited" or "refused": of the calibration that the log gives.
         self.verdict = verdict
-        #: Why the log is refused; None where it is not.
         self.refusal = refusal
-        #: The same as a name that stays: "no_fit" or "findings"; None where it is not refused.
         self.refusal_code = refusal_code
 
     def _repr_html_(self) -> str:
@@ -92,11 +90,13 @@ class Findings(list[Finding]):
 
 
 class Parameter(NamedTuple):
-    """One parameter of a calibration, in its unit."""
+    """One parameter of a calibration, in its SI unit.
+
+    `std`: standard error; None where it is not known, or where the model fixes the parameter.
+    """
 
     name: str
     value: float
-    #: Standard error; None where it is not known, or where the model fixes the parameter.
     std: float | None
     unit: str
 
@@ -159,50 +159,42 @@ class Residuals:
         power = np.mean(np.abs(bins) ** 2, axis=0) * 2 * period / (0.375 * length)
         return (np.arange(1, length // 2) / (length * period), np.sqrt(power))
 
-    def plot(self, ax: Any = None) -> Figure:
-        """Errors over time, s, um and urad: a panel for each axis, or all in `ax`; needs matplotlib.
+    def plot(self, ax: Any = None) -> Any:
+        """Errors over time in s, um and urad, each row light and the mean over half a second, the drift, dark.
 
-        Movements follow each other, and their borders are grey.
+        A panel for each axis, or all in `ax`; gives the array of panels, or `ax`. Movements follow each other, and
+        their borders are grey. Needs matplotlib.
         """
         from matplotlib import pyplot
 
-        if ax is None:
-            figure, panels = pyplot.subplots(3, 1, sharex=True)
-        else:
-            figure, panels = ax.figure, [ax] * 3
+        panels = pyplot.subplots(3, 1, sharex=True, layout="constrained")[1] if ax is None else [ax] * 3
         steps = np.diff(self.time)
-        borders = np.flatnonzero(np.diff(self.movement)) + 1
+        ends = np.diff(self.movement) != 0
         period = float(np.median(steps)) if len(steps) else 0.0
         # A movement may start its time anew.
-        steps = np.where((np.diff(self.movement) != 0) & (steps <= 0), period, steps)
+        steps = np.where(ends & (steps <= 0), period, steps)
         seconds = np.concatenate([self.time[:1], self.time[:1] + np.cumsum(steps)])
+        movements = np.split(np.arange(len(self)), np.flatnonzero(ends) + 1)
         for panel, (axis, (name, unit)) in zip(panels, _AXES.items(), strict=True):
-            unit = unit.replace("u", "\N{MICRO SIGN}", 1)
-            panel.plot(seconds, getattr(self, axis) * 1e6, linewidth=0.5, label=f"{name}, {unit}")
-            panel.set_ylabel(f"{name}, {unit}" if ax is None else "error")
-            for row in borders if len(borders) < 150 else ():
-                panel.axvline(seconds[row], color="0.8", linewidth=0.5, zorder=0)
+            label = f"{name}, {unit.replace('u', chr(0xB5), 1)}"
+            errors = getattr(self, axis) * 1e6
+            (line,) = panel.plot(seconds, errors, linewidth=0.5, alpha=0.4)
+            means = np.concatenate([_mean(errors[rows], round(0.5 / period) if period else 1) for rows in movements])
+            panel.plot(seconds, means, linewidth=1.5, color=line.get_color(), label=label)
+            panel.set_ylabel(label if ax is None else "error")
+            for rows in movements[1:] if len(movements) < 150 else ():
+                panel.axvline(seconds[rows[0]], color="0.8", linewidth=0.5, zorder=0)
         if ax is not None:
             ax.legend()
         panels[-1].set_xlabel("time, s")
-        return figure
+        return panels if ax is None else ax
 
 
-def frame(log: Any, logs: Any, has_reference: bool, has_temperatures: tuple[bool, bool]) -> Any:
-    """The rows of a log as a `pandas.DataFrame`."""
-    pandas = import_module("pandas")
-    columns: dict[str, Any] = {"log": logs, "movement": log.movement, "t_us": log.t_us}
-
-    def add(names: str, array: Any) -> None:
-        columns.update(zip(names.split(), array.T, strict=True))
-
-    add("hall_a hall_b hall_c", log.hall)
-    if log.caps is not None:
-        add("cap_1 cap_2 cap_3", log.caps)
-    add("z_m rx_rad ry_rad", log.vertical)
-    if has_reference:
-        add("x_m y_m rz_rad", log.reference)
-    for name, there in zip(("mount", "body"), has_temperatures, strict=True):
-        if there:
-            columns[f"{name}_c"] = getattr(log, name)
-    return pandas.DataFrame(columns)
+def _mean(errors: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
+    """The mean over so many rows about each row, without rows that are NaN."""
+    window = np.ones(max(1, min(rows, len(errors))))
+    known = np.isfinite(errors)
+    counts = np.convolve(known, window, "same")
+    with np.errstate(invalid="ignore"):
+        means: NDArray[np.float64] = np.convolve(np.where(known, errors, 0.0), window, "same") / counts
+    return means
