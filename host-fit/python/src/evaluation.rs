@@ -16,7 +16,7 @@ use host_fit::input::stage::Stage as Designed;
 use host_fit::report::result::Report;
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyDict, PyList};
 use runtime::ParameterSet;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -93,14 +93,16 @@ impl Evaluation {
 
     /// rms errors of X, Y, Rz over all rows, a dict, m, m, rad.
     #[getter]
-    fn rms(&self) -> BTreeMap<&'static str, f64> {
-        by_axis(self.evaluated.judgement.errors.axes.map(|axis| axis.rms))
+    fn rms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let axes = self.evaluated.judgement.errors.axes;
+        by_axis(py, &axes.map(|axis| axis.rms))
     }
 
     /// The largest errors of X, Y, Rz over all rows, a dict, m, m, rad.
     #[getter]
-    fn peak(&self) -> BTreeMap<&'static str, f64> {
-        by_axis(self.evaluated.judgement.errors.axes.map(|axis| axis.peak))
+    fn peak<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let axes = self.evaluated.judgement.errors.axes;
+        by_axis(py, &axes.map(|axis| axis.peak))
     }
 
     /// Zero deviations of the Hall probes A, B, C, a row for each movement: float64, (movements, 3), m.

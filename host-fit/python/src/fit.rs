@@ -12,7 +12,7 @@ use host_fit::calibration::words::python;
 use host_fit::cli::FitOptions;
 use host_fit::input::axis::PLANAR;
 use host_fit::input::watch::Watch;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use runtime::parameters::Text;
@@ -82,6 +82,7 @@ pub fn fit(
     for (name, value) in options.into_iter().flatten() {
         let name: String = name.extract()?;
         match value.extract::<bool>() {
+            Err(_) if name == "force" => return Err(wrong("force", "True or False is needed")),
             _ if name == "limit" && !value.is_none() => limits = read_limits(&value)?,
             _ if name == "created" => {
                 let text: String = value.extract().map_err(|error| wrong("created", error))?;
@@ -94,7 +95,10 @@ pub fn fit(
         }
     }
     let options = FitOptions::from_words(words);
-    let mut options = options.map_err(|error| PyValueError::new_err(python(&error)))?;
+    let mut options = options.map_err(|error| match error.strip_prefix("unexpected argument") {
+        Some(_) => PyTypeError::new_err(python(&error)),
+        None => PyValueError::new_err(python(&error)),
+    })?;
     options.limit = limits;
     let order = options.order(created, Watch::NONE);
     let mut order = order.map_err(|mismatch| wrong(mismatch.argument, mismatch.problem))?;

@@ -18,7 +18,7 @@ use host_fit::report::page::CERTIFICATE;
 use host_fit::solver::estimator::update::Change;
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyDict, PyList};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -67,20 +67,20 @@ impl Calibration {
     /// rms errors of X, Y, Rz, a dict, m, m, rad: over all rows of the log, zero deviations refitted where the model has
     /// them.
     #[getter]
-    fn rms(&self) -> BTreeMap<&'static str, f64> {
+    fn rms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let judged = self
             .judgement()
             .map(|judged| judged.errors.axes.map(|axis| axis.rms));
-        by_axis(judged.unwrap_or(self.set.fit.rms.map(f64::from)))
+        by_axis(py, &judged.unwrap_or(self.set.fit.rms.map(f64::from)))
     }
 
     /// The largest errors of X, Y, Rz over the same rows, a dict, m, m, rad.
     #[getter]
-    fn peak(&self) -> BTreeMap<&'static str, f64> {
+    fn peak<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let judged = self
             .judgement()
             .map(|judged| judged.errors.axes.map(|axis| axis.peak));
-        by_axis(judged.unwrap_or(self.set.fit.peak.map(f64::from)))
+        by_axis(py, &judged.unwrap_or(self.set.fit.peak.map(f64::from)))
     }
 
     /// Zero deviations of the Hall probes A, B, C, a row for each movement: float64, (movements, 3), m; None of a calibration

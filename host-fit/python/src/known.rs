@@ -4,8 +4,8 @@ use crate::calibration::Calibration;
 use crate::error::wrong;
 use crate::finding;
 use crate::origin::Origin;
+use crate::report::by_axis;
 use crate::stage::Stage;
-use host_fit::input::axis::AXES;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -74,11 +74,10 @@ impl Calibration {
 
     /// The largest magnitudes of the pose that the calibration covers, a dict of x, y, rz, z, rx, ry, m and rad.
     #[getter]
-    fn range(&self) -> BTreeMap<&'static str, f64> {
+    fn range<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let constants = &self.set.constants;
         let ends = [constants.calibrated_planar, constants.calibrated_vertical];
-        let ends = ends.into_iter().flatten().map(f64::from);
-        AXES.iter().map(|axis| axis.key).zip(ends).collect()
+        by_axis(py, ends.map(|ends| ends.map(f64::from)).as_flattened())
     }
 
     /// The calibration with other values of some parameters, a dict by name in the units of `parameters`, as a Monte Carlo

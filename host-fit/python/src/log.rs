@@ -116,7 +116,7 @@ impl Log {
         arrays: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let how = How::new(bad_rows, "all")?;
-        let made = py.import("hallstage._arrays")?.getattr("log_columns")?;
+        let made = py.import("hallstage._arrays")?.getattr("from_arrays")?;
         let (columns, arguments): (Bound<'_, PyDict>, Vec<(String, String)>) =
             made.call((), arrays)?.extract()?;
         let source = Source::text(Path::new(name), csv(&columns, None)?, true);

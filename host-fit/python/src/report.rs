@@ -4,7 +4,7 @@ use crate::error::{internal, output_error, wrong};
 use crate::held::rows_of_three;
 use host_fit::calibration::judge::Judgement;
 use host_fit::calibration::words::{message, python};
-use host_fit::input::axis::PLANAR;
+use host_fit::input::axis::AXES;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
@@ -17,6 +17,7 @@ use host_fit::report::result::Report;
 use host_fit::report::verdict::{Subject, Summary};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::{IntoPyDict, PyDict};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,8 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
 pub fn text(subject: &Subject) -> String {
     let findings = subject.diagnosis.findings.iter();
     let messages = findings.map(|found| message(found) + "\n");
-    python(&(Summary::new(subject).as_text() + &messages.collect::<String>()))
+    let text = Summary::new(subject).as_text() + &messages.collect::<String>();
+    python(text.trim_end())
 }
 
 /// Errors of the rows of a dataset (m, m, rad) as a `hallstage.Residuals`.
@@ -75,9 +77,10 @@ pub fn zero_deviations<'py>(
     )
 }
 
-/// Errors of X, Y, Rz by axis.
-pub fn by_axis(errors: [f64; 3]) -> BTreeMap<&'static str, f64> {
-    PLANAR.iter().map(|axis| axis.key).zip(errors).collect()
+/// Numbers of X, Y, Rz, and where there are more of Z, Rx, Ry, as a dict.
+pub fn by_axis<'py>(py: Python<'py>, numbers: &[f64]) -> PyResult<Bound<'py, PyDict>> {
+    let axes = AXES.iter().map(|axis| axis.key);
+    axes.zip(numbers.iter().copied()).into_py_dict(py)
 }
 
 /// Who says what on a page.

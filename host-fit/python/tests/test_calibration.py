@@ -116,7 +116,7 @@ def test_a_calibration_has_its_stage_noise_range_and_zero_deviations_in_si(
     cal: hs.Calibration, run30: hs.Log, tmp_path: Path
 ) -> None:
     assert cal.stage == run30.stage and cal.noise is not None and np.allclose(cal.noise, 0.5e-6, rtol=0.05)
-    assert list(sorted(cal.range)) == ["rx", "ry", "rz", "x", "y", "z"]
+    assert list(cal.rms) == ["x", "y", "rz"] and list(cal.range) == ["x", "y", "rz", "z", "rx", "ry"]
     assert cal.range["y"] > np.abs(run30.reference[:, 1]).max() and 1e-4 < cal.range["z"] < 1e-3
     assert cal.zero_deviations is not None and cal.zero_deviations.shape == (1, 3)
     assert np.all(np.abs(cal.zero_deviations) < 5e-6)
@@ -312,6 +312,13 @@ def test_a_refused_log_raises_its_findings_and_is_fitted_by_force(run30: hs.Log)
 def test_a_wrong_option_is_named(run30: hs.Log, wrong: dict[str, object], argument: str) -> None:
     with pytest.raises(ValueError, match=argument):
         hs.fit(run30, **wrong)  # type: ignore[arg-type]
+
+
+def test_an_unknown_option_is_a_type_error_and_force_is_true_or_false(run30: hs.Log) -> None:
+    with pytest.raises(TypeError, match="models"):
+        hs.fit(run30, models="31")  # type: ignore[call-arg]
+    with pytest.raises(ValueError, match="force: True or False"):
+        hs.fit(run30, force="yes")  # type: ignore[arg-type]
 
 
 def test_other_threads_go_on_while_a_log_is_fitted(run30: hs.Log) -> None:

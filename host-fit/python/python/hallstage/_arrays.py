@@ -51,7 +51,7 @@ _WHOLE = ("iu", "whole numbers", "int64")
 _CODES = ("iu", "codes (whole numbers)", "int32")
 
 
-def log_columns(
+def from_arrays(
     *, time: Any, hall: Any, caps: Any = None, z: Any = None, rx: Any = None, ry: Any = None, x: Any = None,
     y1: Any = None, y2: Any = None, y: Any = None, rz: Any = None, movement: Any = None, mount: Any = None,
     body: Any = None, units: str = "m", angles: str = "rad",
