@@ -63,8 +63,11 @@ pub fn arrays_error(py: Python<'_>, error: &LogError, arguments: &[(String, Stri
     let (Some((_, argument)), Some(row)) = (arguments.iter().find(named), row) else {
         return log_error(py, error);
     };
+    let nan = CellFault::Missing {
+        text: "NaN".to_owned(),
+    };
     let problem: &dyn Display = match &error.problem {
-        LogProblem::Cell(CellFault::Empty) => &CellFault::Nan,
+        LogProblem::Cell(CellFault::Empty) => &nan,
         other => other,
     };
     let message = said(format_args!("{argument}[{row}]: {problem}"));
