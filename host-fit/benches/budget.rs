@@ -65,7 +65,9 @@ fn drawn(declared: &str, random: &mut Stream) -> String {
         random.normal(u)
     };
     let baseline_m = 0.1 + draw(Input::Baseline);
-    let scale = 1.0 + 1e-6 * draw(Input::BeamScale);
+    let [x, both, apart] = [0; 3].map(|_| 1e-6 * draw(Input::BeamScale));
+    let apart = 0.5f64.sqrt() * apart;
+    let [x, y1, y2] = [x, both + apart, both - apart].map(|part| 1.0 + part);
     let x1_m = 0.5 * baseline_m + draw(Input::BeamPlaces);
     let [x_y, x_z, y1_z, y2_z] = [0; 4].map(|_| draw(Input::BeamPlaces));
     let [a, b, c, d, e, f] = [0; 6].map(|_| draw(Input::BeamAngles));
@@ -73,7 +75,7 @@ fn drawn(declared: &str, random: &mut Stream) -> String {
         "x = {{ y_m = {x_y}, z_m = {x_z}, towards_y_rad = {a}, towards_z_rad = {b} }}\n\
          y1 = {{ x_m = {x1_m}, z_m = {y1_z}, towards_x_rad = {c}, towards_z_rad = {d} }}\n\
          y2 = {{ z_m = {y2_z}, towards_x_rad = {e}, towards_z_rad = {f} }}\n\
-         scale = [{scale}, {scale}, {scale}]\ny_baseline_m = {baseline_m} "
+         scale = [{x}, {y1}, {y2}]\ny_baseline_m = {baseline_m} "
     );
     let places = [0.12, 0.0, -0.12, 0.0, 0.0, -0.12].map(|m| m + draw(Input::GapPlaces));
     let [p, q, r] = [0, 2, 4].map(|k| [places[k], places[k + 1]]);

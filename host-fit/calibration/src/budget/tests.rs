@@ -98,11 +98,15 @@ fn an_error_of_a_beam_acts_as_on_a_rigid_stage() {
         let angles = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 2)];
         let angles = angles.map(|(beam, axis)| one(beam, axis, true)).to_vec();
         let baseline = vec![moved(&[(1, 0.5), (2, -0.5)], 0, false)];
-        let mut scale = readings(&declared);
-        scale *= -1e-6;
         let planar: Matrix3<f64> = readings(&declared).fixed_columns::<3>(0).into();
-        let scale = planar.try_inverse().expect("regular") * scale;
-        let scale = vec![[0, 1, 2].map(|axis| std::array::from_fn(|k| scale[(axis, k)]))];
+        let inverse = planar.try_inverse().expect("regular");
+        let half = 0.5f64.sqrt();
+        let scale = [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, half, -half]].map(|shares| {
+            let wrong = Matrix3::from_diagonal(&(-1e-6 * Vector3::from(shares)));
+            let scale = inverse * wrong * readings(&declared);
+            [0, 1, 2].map(|axis| std::array::from_fn(|k| scale[(axis, k)]))
+        });
+        let scale = scale.to_vec();
         let parameters = designed(&stage);
         for (input, value, size, wanted) in [
             (Input::BeamPlaces, size, size / 0.1, places),

@@ -89,11 +89,13 @@ impl Interferometer {
             Input::BeamPlaces => &[(X, 1), (X, 2), (BOTH, 0), (Y1, 2), (Y2, 2)],
             Input::BeamAngles => &[(X, 1), (X, 2), (Y1, 0), (Y1, 2), (Y2, 0), (Y2, 2)],
             Input::BeamScale => {
-                let scale = self.scale.map(|scale| scale * (1.0 + 1e-6 * error));
-                return vec![Self {
-                    scale,
+                // Nobody knows how alike Y1 and Y2 are: in Y they add, in Rz they are independent.
+                let apart = [0.0, 0.5f64.sqrt(), -0.5f64.sqrt()];
+                let wrong = |shares: [f64; 3]| Self {
+                    scale: [0, 1, 2].map(|k| self.scale[k] * (1.0 + 1e-6 * error * shares[k])),
                     ..self.clone()
-                }];
+                };
+                return [X, BOTH, apart].map(wrong).to_vec();
             }
             _ => &[],
         };
