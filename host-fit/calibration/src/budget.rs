@@ -50,6 +50,8 @@ pub struct Budget {
     pub freedom: f64,
     /// Variances of X, Y, Rz by faults and motion: m2, m2, rad2.
     other: [f64; 3],
+    /// See [`Predicted::range`].
+    range: [[f64; 2]; 3],
 }
 
 impl Budget {
@@ -99,6 +101,7 @@ impl Budget {
             not_included: Vec::new(),
             freedom: freedom as f64,
             other: [0.0; 3],
+            range: predicted.range,
         };
         for (input, name) in NAMES {
             let value = stage.uncertainty.get(input);
@@ -121,6 +124,7 @@ impl Budget {
     /// The budget with the errors in service that a log shows beyond noise and fit.
     #[must_use]
     pub fn with_service(mut self, predicted: &Predicted) -> Self {
+        self.range = predicted.range;
         if let [noise, fit, shown, ..] = self.sources.as_mut_slice() {
             let square = |axis: usize, of: [f64; 3]| of[axis] * of[axis];
             self.other = [0, 1, 2].map(|axis| {
@@ -143,6 +147,16 @@ impl Budget {
     /// Errors of X, Y, Rz in service without those of the declared inputs, rms: m, m, rad.
     pub fn in_service(&self) -> [f64; 3] {
         self.variances(false).map(f64::sqrt)
+    }
+
+    /// The errors in service that the log shows.
+    pub fn predicted(&self) -> Predicted {
+        let (rms, noise) = (self.in_service(), self.noise());
+        Predicted {
+            rms,
+            ratio: [0, 1, 2].map(|axis| rms[axis] / noise[axis]),
+            range: self.range,
+        }
     }
 
     /// Variances of X, Y, Rz by the declared inputs, or by the sources that the log shows: m2, m2, rad2.
@@ -199,7 +213,8 @@ impl Budget {
             let own = source.rms.iter().chain(&source.ends).chain(&source.value);
             own.chain(effects).all(|x| x.is_finite())
         };
-        self.sources.iter().all(of_source) && self.other.iter().all(|x| x.is_finite())
+        let mut own = self.other.iter().chain(self.range.as_flattened());
+        self.sources.iter().all(of_source) && own.all(|x| x.is_finite())
     }
 }
 
@@ -238,7 +253,7 @@ impl Source {
 
 /// The inputs with errors that the fit does not see.
 const NAMES: [(Input, &str); 8] = [
-    (Input::BeamScale, "scale of the beams"),
+    (Input::BeamScale, "scales of the beams"),
     (Input::Baseline, "distance of the two beams along Y"),
     (Input::BeamPlaces, "places of the beams"),
     (Input::BeamAngles, "angles of the beams"),

@@ -33,10 +33,13 @@ use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::{RANGE_MARGIN, calibration};
+use crate::judge::in_motion::by_lags;
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
+use hallstage_input::channel::Channel;
 use hallstage_input::channels::columns;
 use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Finding, Kind, Quantity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
@@ -66,12 +69,8 @@ pub struct Recalibration {
     pub known: Option<StoredPosterior>,
     /// Change of the gain of A, B, C, in parts of the old one, with its standard error.
     pub gains: [(f64, f64); 3],
-    /// Errors predicted for service with the new blob, over the noise floor: X, Y, Rz.
-    pub after: [f64; 3],
-    /// The same with the old blob.
-    pub before: [f64; 3],
-    /// The noise floor of X, Y, Rz, rms: m, m, rad.
-    pub floor: [f64; 3],
+    /// The errors in service to expect of the old blob.
+    pub predicted_before: Option<Predicted>,
     /// Chi-square over residuals.
     pub chi_squared: f64,
     /// Errors over the log by the target's decoder, with the new and with the old blob; zero
@@ -217,20 +216,28 @@ pub fn recalibrate(
     let set = with_parameters(old, &update.parameters, stage, &origin)
         .map_err(RecalibrateError::Unusable)?;
     let judgement = judged(&set);
-    let predicted = declared_service(stage, &update.parameters, update.noise.white_m)
-        .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
+    let at_work = declared_service(stage, &update.parameters, update.noise.white_m);
+    let expect = |off: &[f64]| {
+        let at_work = at_work.as_ref()?;
+        Some(Predicted::new(at_work, &update.posterior.covariance, off))
+    };
+    let predicted = expect(&[0.0; COUNT]);
     let (white_m, covariance) = (update.noise.white_m, &update.posterior.covariance);
     let validity =
         known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
     let temperature = set.constants.temperature.rounded();
     let of_posterior = (&update.parameters, &update.posterior);
-    let diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted));
+    let mut diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted));
+    let late = by_lags(lags_s(&diagnosis.findings), &update.parameters, stage);
+    let late = late.unwrap_or_default();
+    diagnosis.predicted = diagnosis.predicted.map(|of| of.with_added(late));
     // With what the sensors add in service.
     let budget = (diagnosis.predicted.as_ref())
         .filter(|_| known.is_some())
         .and_then(|of| Budget::new(stage, of_posterior, &temperature, of, update.residuals));
     let diagnosis = Diagnosis {
         validity,
+        up_to: known.and_then(|known| known.up_to),
         budget,
         ..diagnosis
     };
@@ -240,26 +247,48 @@ pub fn recalibrate(
         ..judgement.record(rows)
     };
     let gains = update.gains(&old_parameters);
-    let before = |k: usize| {
-        let off = service.difference[k] + service.systematic[k];
-        (1.0 + off / service.noise[k]).sqrt()
+    let (old, new) = (&old_parameters.probes, &update.parameters.probes);
+    let off = old.as_flattened().iter().zip(new.as_flattened());
+    let off: Vec<f64> = off.map(|(old, new)| old - new).collect();
+    // What the sensors add in service, they add to both.
+    let added = |of: Predicted, after: &Predicted| {
+        let at_rest = predicted.map_or(after.rms, |at_rest| at_rest.rms);
+        of.with_added([0, 1, 2].map(|k| after.rms[k].powi(2) - at_rest[k].powi(2)))
     };
+    let after = diagnosis.predicted.as_ref();
+    let predicted_before = expect(&off).zip(after).map(|(of, after)| added(of, after));
     Ok(Recalibration {
         set: ParameterSet { fit, ..set },
         known: known.map(|known| StoredPosterior {
             covariance: update.posterior.covariance.clone(),
             noise: update.noise,
             budget: diagnosis.budget.clone(),
-            ..known.with_log(dataset, stage)
+            ..known.clone().with_logs(dataset)
         }),
         gains,
-        after: service.ratios(),
-        before: [before(0), before(1), before(2)],
-        floor: service.noise.map(f64::sqrt),
+        predicted_before,
         chi_squared: update.chi_squared / update.residuals.max(1) as f64,
         judgement,
         judgement_before,
         diagnosis,
+    })
+}
+
+/// The lags of probes that findings name, s: in service they stay.
+fn lags_s(findings: &[Finding]) -> [f64; 3] {
+    [Channel::HallA, Channel::HallB, Channel::HallC].map(|probe| {
+        let of_probe = findings
+            .iter()
+            .filter(|found| found.channels.contains(&probe));
+        let lag_s = of_probe.map(|found| match found.kind {
+            Kind::Change {
+                quantity: Quantity::Time,
+                size,
+                ..
+            } => 1e-3 * size,
+            _ => 0.0,
+        });
+        lag_s.sum()
     })
 }
 
@@ -284,6 +313,7 @@ pub fn with_parameters(
         calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
         sensitivity_min: old.constants.sensitivity_min.into(),
         temperature,
+        // Lags and bent arms are no matter of a gain, and a gain of a probe is a gain of the coil's field, too.
         motion_correction: old.motion_correction,
         ..calibration([], stage, old.model, parameters)?
     };

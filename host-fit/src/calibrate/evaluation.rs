@@ -1,6 +1,6 @@
 //! A blob judged on logs with reference.
 
-use super::ErrorLimits;
+use crate::report::decision::Decision;
 use crate::report::errors::{RowErrors, errors};
 use crate::report::result::{Judged, Report};
 use crate::report::verdict::{End, Subject};
@@ -23,6 +23,7 @@ use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::paper::Parameters;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
+use serde_json::json;
 
 /// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.
 const ROWS_MAX: usize = 100_000;
@@ -55,8 +56,7 @@ pub struct Evaluation {
     /// Over these, with poses corrected by speed and acceleration; `None` for a blob without a correction.
     corrected: Option<PoseError>,
     zeros: Zeros<'static>,
-    limit: f64,
-    limits: ErrorLimits,
+    decision: Decision,
     /// Why the blob does not do for these logs; `None` if it does.
     pub refusal: Option<Refusal>,
     /// The logs that the blob was fitted to: they verify nothing.
@@ -138,14 +138,17 @@ impl Evaluation {
             Validity::new(stage, &parameters, white_m, covariance)
         });
         let predicted = diagnosis.predicted.as_ref().filter(|_| is_field(set));
+        diagnosis.up_to = known.and_then(|known| known.up_to);
         // The reference of the fit decides.
         let of_fit = known.and_then(|known| known.budget.clone());
         diagnosis.budget = of_fit.zip(predicted).map(|(of, by)| of.with_service(by));
-        let budget = diagnosis.budget.as_ref();
-        let limits = ErrorLimits::default().or(&stage.certificate, predicted, budget);
+        let on_log = set.fit.rms.map(f64::from);
+        let on_log = on_log.map(|rms| (rms > 0.0).then_some(limit * rms));
+        let limits = [stage.certificate.limits, on_log];
+        let decision = Decision::new(limits, stage, &diagnosis, is_field(set));
         let refusal = other
             .or_else(|| Refusal::from_findings(&diagnosis.findings))
-            .or_else(|| limits.refusal(predicted?, diagnosis.verdict));
+            .or_else(|| decision.refusal(predicted?.rms));
         if refusal.is_some() {
             diagnosis.verdict = Some(Verdict::Refused);
         }
@@ -162,8 +165,7 @@ impl Evaluation {
             sampled,
             corrected,
             zeros,
-            limit,
-            limits,
+            decision,
         })
     }
 
@@ -195,6 +197,8 @@ impl Evaluation {
         });
         let corrected = self.corrected.as_ref().map(errors);
         report.figures.set("errors_corrected", corrected);
+        let decision = json!(self.subject().decision());
+        report.figures.set("decision", decision);
         report
     }
 
@@ -208,26 +212,17 @@ impl Evaluation {
 
     /// How it ended, for reports.
     pub fn subject(&self) -> Subject<'_> {
-        let own = self.set.fit.rms.map(f64::from);
         let end = match &self.refusal {
             None | Some(Refusal::BeyondLimit { .. }) => End::Judged,
             Some(refusal) => End::Failed(refusal),
         };
-        let in_service = is_field(&self.set) && self.diagnosis.predicted.is_some();
-        let on_log = own.map(|rms| (rms > 0.0).then_some(self.limit * rms));
         Subject {
             end,
             diagnosis: &self.diagnosis,
             is_field: is_field(&self.set),
             errors: Some(&self.judgement.errors),
-            limits: if in_service {
-                self.limits.accepted
-            } else {
-                on_log
-            },
-            guards: self.limits.guards,
             corrected: self.corrected.as_ref(),
-            in_service,
+            decision: self.decision,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::{ErrorLimits, name_of};
 use crate::report::channels::channels;
+use crate::report::decision::Decision;
 use crate::report::figure::{Group, group};
 use crate::report::result::Report;
 use crate::report::verdict::{End, Subject};
@@ -54,7 +55,7 @@ pub struct JudgedFit {
     /// Whether the search was ended before its time.
     pub is_interrupted: bool,
     is_kept: bool,
-    limits: ErrorLimits,
+    decision: Decision,
 }
 
 impl FitOrder {
@@ -108,10 +109,9 @@ impl FitOrder {
         if let Some(motion) = &diagnosis.motion {
             fitted = fitted.map(|fit| fit.with_motion(&motion.fit));
         }
+        let limits = self.limits.or(&stage.certificate);
         let is_field = fitted.as_ref().is_ok_and(|fit| fit.field.is_some());
-        let predicted = diagnosis.predicted.as_ref().filter(|_| is_field);
-        let budget = diagnosis.budget.as_ref();
-        let limits = self.limits.or(&stage.certificate, predicted, budget);
+        let decision = Decision::new([limits; 2], stage, &diagnosis, is_field);
         let mut outcome = JudgedFit {
             fitted,
             diagnosis,
@@ -119,7 +119,7 @@ impl FitOrder {
             has_blob: false,
             is_interrupted,
             is_kept: self.is_kept,
-            limits,
+            decision,
         };
         let refusal = match &outcome.fitted {
             Err(error) => Some(Refusal::no_fit(error, &outcome.diagnosis.findings)),
@@ -152,24 +152,16 @@ impl JudgedFit {
         self.fitted.as_ref().is_ok_and(|fit| fit.field.is_some())
     }
 
-    /// Errors in service that the limits hold for, rms: m, m, rad.
-    fn in_service(&self) -> Option<[f64; 3]> {
-        let predicted = self.diagnosis.predicted.map(|predicted| predicted.rms);
-        predicted.filter(|_| self.is_field())
-    }
-
     /// Why a fit is not to be used: findings, or errors beyond the limits.
     fn refusal_of(&self, fit: &Fit) -> Option<Refusal> {
-        if let Some(refusal) = Refusal::from_findings(&self.diagnosis.findings) {
-            return Some(refusal);
-        }
-        let in_service = self.in_service();
-        let on_log = || fit.judgement.errors.axes.map(|axis| axis.rms);
-        let errors = self.limits.exceeded(in_service.unwrap_or_else(on_log));
-        let is_in_service = in_service.is_some();
-        (!errors.is_empty()).then_some(Refusal::BeyondLimit {
-            errors,
-            is_in_service,
+        Refusal::from_findings(&self.diagnosis.findings).or_else(|| {
+            let on_log = || fit.judgement.errors.axes.map(|axis| axis.rms);
+            let predicted = self
+                .diagnosis
+                .predicted
+                .filter(|_| self.decision.in_service);
+            self.decision
+                .refusal(predicted.map_or_else(on_log, |of| of.rms))
         })
     }
 
@@ -180,12 +172,13 @@ impl JudgedFit {
     }
 
     /// What goes beside the blob of these logs: what is known of a field model; `None` of others.
-    pub fn known(&self, dataset: &Dataset, stage: &Stage) -> Option<StoredPosterior> {
+    pub fn known(&self, dataset: &Dataset) -> Option<StoredPosterior> {
         let known = StoredPosterior::from_fit(self.fitted.as_ref().ok()?)?;
         Some(StoredPosterior {
             repaired: self.diagnosis.repaired().map(words::message).collect(),
             budget: self.diagnosis.budget.clone(),
-            ..known.with_log(dataset, stage)
+            up_to: self.diagnosis.up_to,
+            ..known.with_logs(dataset)
         })
     }
 
@@ -202,10 +195,8 @@ impl JudgedFit {
             diagnosis: &self.diagnosis,
             is_field: self.is_field(),
             errors: self.fitted.as_ref().ok().map(|fit| &fit.judgement.errors),
-            limits: self.limits.accepted,
-            guards: self.limits.guards,
             corrected: None,
-            in_service: self.in_service().is_some(),
+            decision: self.decision,
         }
     }
 
@@ -237,13 +228,16 @@ impl JudgedFit {
         let fit = self.fitted.as_ref().ok()?;
         let judged = (&self.diagnosis, self.refusal.as_ref());
         let log_and_stage = (log, stage);
-        Some(Report::from_fit(
+        let mut report = Report::from_fit(
             fit,
             &order.settings,
             log_and_stage,
             (name_of(&fit.fitted.loss), elapsed_s),
             judged,
-        ))
+        );
+        let decision = json!(self.subject().decision());
+        report.figures.set("decision", decision);
+        Some(report)
     }
 }
 

@@ -1,14 +1,16 @@
 //! What is said of a calibration that was brought up to date.
 
-use super::{ErrorLimits, name_of};
+use super::name_of;
+use crate::report::decision::Decision;
 use crate::report::errors::{errors, pose};
-use crate::report::figure::{Group, figure, group, micro};
+use crate::report::figure::{Figure, Group, figure, group, micro};
 use crate::report::page::AsFound;
 use crate::report::result::{Judged, Report};
 use crate::report::table::Table;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
+use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_calibration::recalibrate::{
     RecalibrateError, Recalibration, StoredPosterior, own_logs, recalibrate,
@@ -33,8 +35,7 @@ pub struct Updated {
     pub figures: Group,
     /// Why it is no good.
     pub refusal: Option<Refusal>,
-    /// Largest rms errors in service.
-    limits: ErrorLimits,
+    decision: Decision,
 }
 
 impl Updated {
@@ -56,16 +57,22 @@ impl Updated {
         let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
         let predicted = new.diagnosis.predicted.as_ref();
-        let budget = new.diagnosis.budget.as_ref();
-        let limits = ErrorLimits::default().or(&stage.certificate, predicted, budget);
+        let limits = [stage.certificate.limits, [None; 3]];
+        let decision = Decision::new(limits, stage, &new.diagnosis, true);
         let refusal = Refusal::from_findings(&new.diagnosis.findings);
-        Ok(Self {
+        let mut updated = Self {
             figures: figures(change, &new, log, &warnings),
-            refusal: refusal.or_else(|| limits.refusal(predicted?, new.diagnosis.verdict)),
-            limits,
+            refusal: refusal.or_else(|| decision.refusal(predicted?.rms)),
+            decision,
             new,
             warnings,
-        })
+        };
+        let left = updated.subject().decision();
+        updated.figures.set("decision", json!(left));
+        let found = updated.new.predicted_before;
+        let found = found.map(|of| json!(decision.figures(of.rms, decision.passes(of.rms))));
+        updated.figures.set("decision_as_found", found);
+        Ok(updated)
     }
 
     /// Why it is no good, in words.
@@ -95,22 +102,34 @@ impl Updated {
             refusal: self.refusal.as_ref(),
         });
         report.figures = self.figures.clone();
-        let in_service = |ratios: [f64; 3]| [0, 1, 2].map(|k| ratios[k] * new.floor[k]);
         let mut table = Table {
             decimals: Some(2),
             ..Table::new(
-                "As found and as left",
-                &["rms on the log", "rms in service"],
+                "As found and as left, by one decision rule",
+                &[
+                    "rms on the log",
+                    "rms in service",
+                    "limit in service",
+                    "pass",
+                ],
             )
         };
-        for (state, judgement, ratios) in [
-            ("as found", &new.judgement_before, new.before),
-            ("as left", &new.judgement, new.after),
+        let found = new.predicted_before;
+        let passes = found.map_or([None; 3], |of| self.decision.passes(of.rms));
+        let left = self.subject().passes();
+        for (state, judgement, predicted, passes) in [
+            ("as found", &new.judgement_before, found, passes),
+            ("as left", &new.judgement, new.diagnosis.predicted, left),
         ] {
             for (k, axis) in PLANAR.iter().enumerate() {
-                let errors = [judgement.errors.axes[k].rms, in_service(ratios)[k]];
-                let name = format!("{}, {state}", axis.name);
-                table.row(name, errors.map(|error| micro(axis, error)));
+                let service = predicted.map(|of| of.rms[k]);
+                let on_log = Some(judgement.errors.axes[k].rms);
+                let error = |error: Option<f64>| error.map_or(Figure::None, |of| micro(axis, of));
+                let mut cells = [on_log, service, self.decision.accepted(k)]
+                    .map(error)
+                    .to_vec();
+                cells.push(passes[k].map_or(Figure::None, Figure::Is));
+                table.row(format!("{}, {state}", axis.name), cells);
             }
         }
         let before = &new.judgement_before;
@@ -139,10 +158,8 @@ impl Updated {
             diagnosis: &self.new.diagnosis,
             is_field: true,
             errors: Some(&self.new.judgement.errors),
-            limits: self.limits.accepted,
-            guards: self.limits.guards,
             corrected: None,
-            in_service: true,
+            decision: self.decision,
         }
     }
 }
@@ -164,17 +181,18 @@ fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
 fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Group {
     let gain = |(change, error): (f64, f64)| group! { "change" => figure(change * 100.0, "%").with_error(Some(error * 100.0)) };
     let [a, b, c] = new.gains.map(gain);
-    // rms errors, from ratios to the noise floor.
-    let rms = |ratios: [f64; 3]| pose([0, 1, 2].map(|k| new.floor[k] * ratios[k]));
+    let (before, after) = (new.predicted_before, new.diagnosis.predicted);
+    let rms = |of: Option<Predicted>| of.map(|of| pose(of.rms));
+    let floor = after.map(|of| pose([0, 1, 2].map(|axis| of.noise(axis))));
     group! {
         "what" => name_of(&change),
         "rows" => log.dataset.rows.len(),
         "movements" => log.dataset.movements.len(),
         "gains" => group! { "a" => a, "b" => b, "c" => c },
-        // Predicted for service over the calibrated range: with the old blob, with the new one, and from the noise of the
+        // Predicted for the declared service: with the old blob, with the new one, and from the noise of the
         // probes alone.
         "predicted_service" => group! {
-            "before" => rms(new.before), "after" => rms(new.after), "floor" => rms([1.0; 3]),
+            "before" => rms(before), "after" => rms(after), "floor" => floor,
         },
         // Whether there was an old posterior, and so a new posterior.
         "posterior" => new.known.is_some(),

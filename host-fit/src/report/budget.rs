@@ -106,6 +106,19 @@ pub(super) fn table(budget: &Budget) -> Table {
     table
 }
 
+/// What stands below the table.
+pub(super) fn note(budget: &Budget) -> String {
+    let freedom = budget.effective_freedom();
+    let freedom = freedom.into_iter().fold(f64::INFINITY, f64::min);
+    let absent = match budget.not_included.as_slice() {
+        [] => String::new(),
+        absent => format!(" Not included: {}.", absent.join(", ")),
+    };
+    format!(
+        "u: standard uncertainty of the input. Effective degrees of freedom: {freedom:.0} or more.{absent}"
+    )
+}
+
 /// A standard uncertainty in a unit that reads well.
 fn worded(value: f64, unit: &str) -> String {
     let (by, unit) = match unit {

@@ -2,11 +2,11 @@
 
 use super::figure::{Figure, Group, figure, group};
 use hallstage_calibration::fit::Fit;
-use hallstage_calibration::judge::in_motion::InMotion;
+use hallstage_calibration::judge::in_motion::UpTo;
 use serde_json::{Value, json};
 
 /// The largest motion with good errors: rms, all axes at once, rotations at 0.25 m.
-pub(super) fn valid_up_to(motion: InMotion) -> Value {
+pub(super) fn valid_up_to(motion: UpTo) -> Value {
     json!({
         "acceleration_m_s2": motion.acceleration_m_s2,
         "speed_mm_s": motion.speed_m_s * 1e3,

@@ -7,16 +7,16 @@ use super::figure::Figure;
 use super::html::{Cause, Page, Section};
 use super::parameters;
 use super::provenance::Provenance;
+use super::reference::reference;
 use super::result::Report;
 use super::table::Table;
 use super::text::file_name;
-use super::trusted::reference;
 use super::verdict::{End, Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::{PoseError, white_noise};
-use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::words;
-use hallstage_input::axis::{AXES, Axis, PLANAR, counted, sign};
+use hallstage_input::axis::{AXES, Axis, counted, sign};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::{Stage, TEXTS};
 use hallstage_solver::estimator::model::Model;
@@ -53,7 +53,7 @@ pub struct Source<'a> {
     pub report: Option<&'a Report>,
     /// The calibration before it was brought up to date.
     pub as_found: Option<AsFound>,
-    /// The number of the certificate of the blob that was judged or brought up to date; empty without one.
+    /// The number of the certificate of the blob that was judged, brought up to date or replaced; empty without one.
     pub certificate: String,
 }
 
@@ -109,11 +109,11 @@ impl Source<'_> {
             tables: vec![self.provenance.0.clone()],
             ..Section::default()
         });
-        let [number, ..] = &stage.certificate.texts;
-        let (title, number) = match (self.title, self.is_certificate()) {
-            (title, true) => (title, number.clone()),
-            (CERTIFICATE, false) => (REPORT, self.provenance.document(&self.facts)),
-            (title, false) => (title, self.provenance.document(&self.facts)),
+        let document = || self.provenance.document(&self.facts);
+        let (title, number) = match (self.title, self.number()) {
+            (title, Some(number)) => (title, number),
+            (CERTIFICATE, None) => (REPORT, document()),
+            (title, None) => (title, document()),
         };
         let page = Page {
             title,
@@ -126,6 +126,12 @@ impl Source<'_> {
             sections,
         };
         page.html()
+    }
+
+    /// The number of the certificate; `None` of a page that is none.
+    pub fn number(&self) -> Option<String> {
+        let [number, ..] = &self.stage.certificate.texts;
+        self.is_certificate().then(|| number.clone())
     }
 
     /// Whether it is a certificate: of a calibration that can be used, with all fields and a number of its own.
@@ -170,7 +176,7 @@ impl Source<'_> {
             );
         }
         if !self.certificate.is_empty() {
-            let name = "latest certificate of the calibration as found".to_owned();
+            let name = "latest certificate before".to_owned();
             facts.insert(1, [name, self.certificate.clone()]);
         }
         facts.extend(self.facts.iter().cloned());
@@ -184,8 +190,8 @@ impl Source<'_> {
                 "the results hold for this stage, in the state of the log".to_owned(),
             );
         }
-        if self.subject.in_service {
-            add("decision rule", self.decision_rule());
+        if let Some(rule) = self.subject.decision.text() {
+            add("decision rule", rule);
         }
         if let Some(Report { set, .. }) = self.report {
             let c = &set.constants;
@@ -201,9 +207,9 @@ impl Source<'_> {
             add("valid for", ranges.join(", "));
         }
         add("temperature", self.temperature());
-        let motion = self.subject.diagnosis.motion.as_ref();
-        if let Some(motion) = motion.filter(|_| self.subject.is_field) {
-            add("motion", words::up_to(motion));
+        let up_to = self.subject.diagnosis.up_to.as_ref();
+        if let Some(up_to) = up_to.filter(|_| self.subject.is_field) {
+            add("motion", words::up_to(up_to));
         }
         add("reference", reference(self.stage));
         let (rows, movements) = self.dataset.read();
@@ -213,43 +219,6 @@ impl Source<'_> {
         let what = format!("{}: {rows} rows in {movements}", logs.join(", "));
         add("log", what);
         facts
-    }
-
-    /// The decision rule with its numbers.
-    fn decision_rule(&self) -> String {
-        let Subject { limits, guards, .. } = self.subject;
-        let by_axis = |text: &dyn Fn(usize) -> Option<String>| {
-            let text = |(k, axis): (usize, &Axis)| {
-                Some(format!("{} {} {}", axis.name, text(k)?, sign(axis.micro)))
-            };
-            let texts: Vec<String> = PLANAR.iter().enumerate().filter_map(text).collect();
-            texts.join(", ")
-        };
-        let is_guarded = self.stage.certificate.is_guarded;
-        let limits = by_axis(&|k| {
-            let [accepted, guard] = [limits[k]?, guards[k]].map(|si| si * 1e6);
-            Some(match is_guarded {
-                true => format!("{:.3} - {guard:.3} = {accepted:.3}", accepted + guard),
-                false => format!("{accepted:.2}"),
-            })
-        });
-        let noise = by_axis(&|k| {
-            let noise = self.subject.diagnosis.predicted.as_ref()?.noise(k);
-            Some(format!("{:.2}", LIMITED_MAX * noise * 1e6))
-        });
-        let of_noise = format!("{LIMITED_MAX:.2} times the noise of the sensors: {noise}");
-        match (limits.as_str(), is_guarded) {
-            ("", _) => {
-                format!("simple acceptance (JCGM 106): rms errors in service at most {of_noise}")
-            }
-            (limits, false) => format!(
-                "simple acceptance (JCGM 106): rms errors in service at most at the limit: {limits}; and at most {of_noise}"
-            ),
-            (limits, true) => format!(
-                "guarded acceptance (JCGM 106): rms errors in service at most at the limit less a guard band: {limits}; and at most \
-                 {of_noise}. The guard band is the uncertainty of the rms error, by the log (one-sided 95 %) and by the declared inputs (1.96 standard uncertainties)"
-            ),
-        }
     }
 
     /// Temperatures of the log, and how far from the temperature of calibration the errors hold.

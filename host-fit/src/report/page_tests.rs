@@ -1,11 +1,11 @@
 use super::*;
+use crate::report::decision::Decision;
 use crate::report::result::Judged;
 use crate::report::verdict::End;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
-use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_input::dataset::{Movement, Row};
 use hallstage_input::finding::{Finding, Kind, Severity};
@@ -43,10 +43,8 @@ fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {
         diagnosis,
         is_field: false,
         errors: None,
-        limits: [None; 3],
-        guards: [0.0; 3],
         corrected: None,
-        in_service: false,
+        decision: Decision::default(),
     }
 }
 
@@ -212,30 +210,4 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
     assert!(foot(&of(CERTIFICATE, "B & 6")));
     let again = of(CERTIFICATE, &stage.certificate.texts[0]);
     assert!(again.contains("a number of its own") && !foot(&again));
-}
-
-#[test]
-fn the_decision_rule_has_limit_guard_band_and_what_is_accepted() {
-    let mut stage = stage();
-    stage.certificate.is_guarded = true;
-    let dataset = shipped(&stage);
-    let predicted = Predicted {
-        rms: [1e-6; 3],
-        ratio: [1.0; 3],
-        range: [[1e-6; 2]; 3],
-    };
-    let diagnosis = Diagnosis {
-        predicted: Some(predicted),
-        ..Diagnosis::default()
-    };
-    let guarded = Subject {
-        limits: [Some(1.25e-6), None, None],
-        guards: [0.25e-6, 0.0, 0.0],
-        in_service: true,
-        ..subject(End::Written, &diagnosis)
-    };
-    let page = source(&stage, &dataset, guarded).html().expect("a page");
-    for part in ["X 1.500 - 0.250 = 1.250 µm", "Rz 1.30 µrad"] {
-        assert!(page.contains(part), "{part}");
-    }
 }

@@ -1,14 +1,15 @@
 //! What a person reads first: whether the calibration can be used, its errors by axis, what to do next.
 
 use super::budget::{self, COVERAGE};
-use super::figure::{Figure, micro};
+use super::decision::Decision;
+use super::figure::{Figure, Group, micro};
 use super::table::Table;
 use super::text::as_text;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::statistics::PoseError;
-use hallstage_calibration::judge::verdict::{LIMITED_MAX, Verdict};
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::words;
 use hallstage_input::axis::PLANAR;
 use hallstage_input::finding::Severity;
@@ -42,13 +43,38 @@ pub struct Subject<'a> {
     pub errors: Option<&'a PoseError>,
     /// The same with poses corrected by the speed and the acceleration of the reference, for a blob with the correction.
     pub corrected: Option<&'a PoseError>,
-    /// Largest rms errors of X, Y, Rz, guard bands taken off: m, m, rad.
-    pub limits: [Option<f64>; 3],
-    /// These guard bands.
-    pub guards: [f64; 3],
-    /// Whether these hold for the errors in service, in place of those on the log. In service a field model has a limit of
-    /// its own: the smaller one counts.
-    pub in_service: bool,
+    /// The limits of the errors.
+    pub decision: Decision,
+}
+
+impl Subject<'_> {
+    /// The rms errors that the limits hold for: m, m, rad.
+    fn decided(&self) -> Option<[f64; 3]> {
+        match self.decision.in_service {
+            true => Some(self.diagnosis.predicted.as_ref()?.rms),
+            false => Some(self.errors?.axes.map(|axis| axis.rms)),
+        }
+    }
+
+    /// Whether they are accepted. Where another reason than an error refuses the log, its errors decide nothing.
+    pub fn passes(&self) -> [Option<bool>; 3] {
+        let passes = self.decided().map(|rms| self.decision.passes(rms));
+        let passes = passes.unwrap_or_default();
+        let is_refused = self.diagnosis.verdict == Some(Verdict::Refused);
+        match is_refused && !passes.contains(&Some(false)) {
+            true => [None; 3],
+            false => passes,
+        }
+    }
+
+    /// The decision rule, and how the errors do by it.
+    pub fn decision(&self) -> Group {
+        let passes = self.passes();
+        let by_axis = self.decided().map(|rms| self.decision.figures(rms, passes));
+        let mut figures = by_axis.unwrap_or_default();
+        figures.set("rule", self.decision.text());
+        figures
+    }
 }
 
 /// Verdict, errors by axis, and what to do.
@@ -64,8 +90,8 @@ pub struct Summary {
     pub axes: Table,
     /// A row for each source of uncertainty.
     pub budget: Table,
-    /// The inputs that the budget lacks.
-    pub not_included: String,
+    /// What stands below it: degrees of freedom, and the inputs that it lacks.
+    pub budget_note: String,
     /// What to do next; empty if nothing.
     pub next: String,
     /// Whether that is the remedy of a finding. The message of the finding ends with it.
@@ -96,7 +122,7 @@ impl Summary {
             sentence: sentence(of),
             axes: axes(of, predicted),
             budget: budget.map(budget::table).unwrap_or_default(),
-            not_included: budget.map_or(String::new(), |budget| budget.not_included.join(", ")),
+            budget_note: budget.map_or(String::new(), budget::note),
             is_remedy: remedy.is_some(),
             next: remedy.unwrap_or_else(|| next(of, verdict).to_owned()),
         }
@@ -151,7 +177,7 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         "rms on the log",
         "noise",
         "rms in service",
-        match of.in_service {
+        match of.decision.in_service {
             true => "limit in service",
             false => "limit on the log",
         },
@@ -165,30 +191,21 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         decimals: Some(2),
         ..Table::new("", &columns)
     };
+    let passes = of.passes();
     for (k, axis) in PLANAR.iter().enumerate() {
         let rms = of.errors.map(|errors| errors.axes[k].rms);
         let service = predicted.map(|predicted| predicted.rms[k]);
         let noise = predicted.map(|predicted| predicted.rms[k] / predicted.ratio[k]);
-        // A sensor that stays wrong may exceed it without a refusal.
-        let is_refused = of.diagnosis.verdict == Some(Verdict::Refused);
-        let own = noise
-            .filter(|_| of.is_field)
-            .map(|noise| LIMITED_MAX * noise);
-        let own = own.filter(|own| is_refused || service <= Some(*own));
-        let (limit, measured) = match of.in_service {
-            true => (
-                of.limits[k].into_iter().chain(own).reduce(f64::min),
-                service,
-            ),
-            false => (of.limits[k], rms),
-        };
-        let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
+        let limit = of.decision.accepted(k);
         let budget = of.diagnosis.budget.as_ref();
         let combined = budget.map(|budget| budget.combined()[0][k]);
         let uncertainty = combined.or(service).or(rms).map(|rms| COVERAGE * rms);
         let error = |error: Option<f64>| error.map_or(Figure::None, |error| micro(axis, error));
         let mut figures = [rms, noise, service, limit].map(error).to_vec();
-        figures.extend([passes.map_or(Figure::None, Figure::Is), error(uncertainty)]);
+        figures.extend([
+            passes[k].map_or(Figure::None, Figure::Is),
+            error(uncertainty),
+        ]);
         if let Some(corrected) = of.corrected {
             figures.insert(1, micro(axis, corrected.axes[k].rms));
         }
@@ -259,15 +276,17 @@ mod tests {
             }),
             ..Diagnosis::default()
         };
+        let limits = [None, Some(0.9e-6), None];
         Summary::new(&Subject {
             end,
             diagnosis: &diagnosis,
             is_field,
             errors: Some(&errors),
-            limits: [None, Some(0.9e-6), None],
-            guards: [0.0; 3],
             corrected: None,
-            in_service,
+            decision: match in_service {
+                true => Decision::in_service(limits, false, (&PREDICTED, None), verdict),
+                false => Decision::on_log(limits),
+            },
         })
     }
 
@@ -324,6 +343,10 @@ mod tests {
         let [title, x, y, ..] = &rows(false)[..] else {
             panic!("three axes");
         };
+        // Errors within the limits do not pass where the log is refused.
+        let refused = summary(End::Judged, Some(Verdict::Refused), true);
+        let cells = refused.axes.cells().rows;
+        assert!(cells.iter().all(|row| row[5] == "-"), "{cells:?}");
         assert!(title.contains("limit on the log pass"), "{title}");
         assert_eq!(x, "X 1.00 1.00 1.20 - - 2.40 µm");
         assert_eq!(y, "Y 1.00 0.50 0.50 0.90 no 1.00 µm");

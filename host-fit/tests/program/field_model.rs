@@ -149,6 +149,7 @@ fn the_budget_of_a_fit_reaches_the_page_and_the_uncertainty_of_each_pose() {
         );
         let page = bench.text("report/index.html");
         assert!(page.contains("Uncertainty budget") && page.contains("beam_angles_rad"));
+        assert!(page.contains("Effective degrees of freedom: "));
         // The stage file of a decoding says nothing of the reference of the fit.
         bench.good("decode p.bin service.csv --out pose.csv --uncertainty --force");
         let poses = bench.text("pose.csv");

@@ -36,7 +36,7 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     bench.write("later.csv", with_gains(&bench.text("log.csv"), [0.99; 3]));
     let recalibrate = "recalibrate old.bin weak.csv --what gain";
     bench.good(&format!(
-        "{recalibrate} --out new.bin --created today --json new.json --report page"
+        "{recalibrate} --out new.bin --created 2026-11-26 --json new.json --report page"
     ));
     let page = bench.text("page/index.html");
     for part in [
@@ -66,7 +66,7 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     let inspected = bench.figures("inspect new.bin");
     assert_eq!(
         (&inspected["serial"], &inspected["created"]),
-        (&"HS-3".into(), &"today".into())
+        (&"HS-3".into(), &"2026-11-26".into())
     );
 
     // The new posterior carries on: here all parameters, from the new blob.
@@ -83,13 +83,15 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
 #[test]
 fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     let bench = bench();
-    let log = bench.text("log.csv");
+    bench.write("other.csv", plan(8.0, [6.0, 7.0, 8.0, 5.0, 4.5, 6.5]));
+    bench.good("simulate --plan other.csv --seed 3 --out second.csv");
+    let log = bench.text("second.csv");
     let sparks = changed(&log, |row, cells| {
         cells[HALL_A] += 1600 * i64::from(row % 100 == 50);
     });
-    // From the middle of the run on B reads 0.25 % more.
+    // From the middle of the run on B reads 0.2 % more.
     let drifts = changed(&log, |row, cells| {
-        cells[HALL_A + 1] += cells[HALL_A + 1] * i64::from(row >= 2000) / 400;
+        cells[HALL_A + 1] += cells[HALL_A + 1] * i64::from(row >= 2000) / 500;
     });
     for (log, code, verdict) in [
         // Service has the sparks of a probe, too.
@@ -136,6 +138,16 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     refused("old.bin turned.csv --what all", 4, &parts);
     let parts = ["was fitted to log.csv", "record a new log"];
     refused("old.bin log.csv --what gains --report found", 4, &parts);
+    // An excerpt in another form is known, too: its second half, with times from zero.
+    let log = bench.text("log.csv");
+    let rows = log.lines().enumerate();
+    let half = rows.filter(|(k, _)| *k == 0 || *k > 2000);
+    let half = half
+        .map(|(_, line)| format!("{line}\n"))
+        .collect::<String>();
+    bench.write("half.csv", half);
+    let parts = ["was fitted to half.csv", "record a new log"];
+    refused("old.bin half.csv --what gains", 4, &parts);
     // What the auditor then wants is the blob as it was found.
     let page = bench.text("found/index.html");
     for part in ["Calibration as found", "was fitted to log.csv", "X rms"] {
@@ -188,6 +200,40 @@ fn eval_of_a_fast_log_says_how_fast_it_is_and_is_limited_by_its_errors() {
 }
 
 #[test]
+fn a_late_probe_is_in_the_errors_of_a_recalibrated_blob_and_one_rule_judges_it_as_found_and_as_left()
+ {
+    let bench = bench();
+    let simulate = "simulate --protocol combined --seed 3 --force";
+    let recalibrate =
+        "recalibrate old.bin late.csv --what gains --out new.bin --json new.json --report page";
+    bench.good(&format!(
+        "{simulate} --probe-lag-us 0,0,1500 --out late.csv"
+    ));
+    bench.bad(recalibrate, 4, &["The time of Hall C is 1.50 ms behind"]);
+    let json = bench.json("new.json");
+    let rms = |of: &str| number(&json["predicted_service"][of]["x_um"]);
+    assert!(rms("after") > 1.3 * rms("floor"), "{json}");
+    let decision = &json["decision"]["x"];
+    assert_eq!(
+        (number(&decision["error_um"]), &decision["pass"]),
+        (rms("after"), &false.into())
+    );
+
+    bench.good(&format!("{simulate} --out now.csv"));
+    bench.write("late.csv", with_gains(&bench.text("now.csv"), [0.995; 3]));
+    bench.good(recalibrate);
+    let json = bench.json("new.json");
+    let [found, left] = ["decision_as_found", "decision"].map(|of| &json[of]["y"]);
+    assert_eq!(found["limit_um"], left["limit_um"]);
+    assert_eq!(
+        (&found["pass"], &left["pass"]),
+        (&false.into(), &true.into())
+    );
+    let page = bench.text("page/index.html");
+    says(&page, "As found and as left, by one decision rule");
+}
+
+#[test]
 fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit() {
     let bench = bench();
     let own = bench.good("eval old.bin log.csv");
@@ -208,4 +254,60 @@ fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit
     bench.good("simulate --plan run.csv --seed 4 --out other.csv");
     let words = "A fit to this log has the probes elsewhere";
     assert_eq!(judged("other.csv", words, "other_log"), Some(0));
+}
+
+#[test]
+fn a_number_is_taken_once_a_certificate_has_it_and_no_other_calibration_takes_it() {
+    let bench = bench();
+    bench.write("run.csv", plan(8.0, [6.0, 7.0, 8.0, 5.0, 4.5, 6.5]));
+    bench.good("simulate --plan run.csv --seed 3 --out new.csv");
+    let texts = [
+        "number",
+        "laboratory",
+        "customer",
+        "method",
+        "conditions",
+        "authorised_by",
+    ];
+    let texts = texts.map(|key| format!("{key} = \"of the {key}\"\n"));
+    let texts = texts.concat() + "instruments = [\"a laser\"]\n";
+    let stage = format!("{}\n[certificate]\n{texts}", bench.text("stage.toml"));
+    bench.write("stage.toml", stage);
+    let title = |arguments: &str, title: &str| {
+        bench.good(&format!("{arguments} --report page"));
+        let page = bench.text("page/index.html");
+        says(&page, &format!("<h1>{title}</h1>"));
+        page
+    };
+    let earlier = "latest certificate before";
+    let verified = |is_taken: bool| {
+        let page = title("eval cal.bin new.csv", "Verification of a calibration");
+        assert_eq!(page.contains(earlier), is_taken);
+        says(&page, "<td>motion</td>");
+    };
+    let fit = "--out cal.bin --serial HS-3";
+    title(&format!("fit log.csv {fit}"), "Calibration report");
+    verified(false);
+    for _ in 0..2 {
+        title(
+            &format!("fit log.csv {fit} --created 2026-01-02"),
+            "Calibration certificate",
+        );
+        verified(true);
+    }
+    for command in [
+        "recalibrate cal.bin new.csv --what gains --out new.bin",
+        &format!("fit new.csv {fit}"),
+    ] {
+        let page = title(
+            &format!("{command} --created 2026-02-02"),
+            "Calibration report",
+        );
+        says(&page, "a number of its own");
+    }
+    bench.bad(
+        "fit log.csv --out x.bin --created tomorrow",
+        2,
+        &["2026-11-26"],
+    );
 }

@@ -55,7 +55,7 @@ mod units;
 use crate::budget::Budget;
 use crate::fit::{Estimate, Fit, FitError, FitSettings, ModelChoice, Repair, fit};
 use crate::judge::identify::FitFailure;
-use crate::judge::in_motion::InMotion;
+use crate::judge::in_motion::{InMotion, UpTo};
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
@@ -94,6 +94,8 @@ pub struct Diagnosis {
     pub validity: Option<Validity>,
     /// What speed and acceleration add in service; [`Self::predicted`] includes it.
     pub motion: Option<InMotion>,
+    /// The largest motion with good errors, by the fit of the calibration.
+    pub up_to: Option<UpTo>,
 }
 
 /// The diagnosis of a log and of the fit to it.
@@ -170,6 +172,7 @@ pub fn diagnose_log(
         }
         InMotion::new(&motion, parameters, stage, &at_rest?)
     });
+    out.up_to = out.motion.map(|motion| motion.up_to);
     let mut stays = columns.stays;
     let (_, drifts) = found.unwrap_or_default();
     (0..3).for_each(|axis| stays[axis] += drifts[axis]);

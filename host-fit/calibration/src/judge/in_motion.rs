@@ -6,6 +6,8 @@ use hallstage_input::finding::{Finding, Kind};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::dynamics::{ARM_M, MotionFit, ServiceMotion};
 use hallstage_solver::estimator::parameters::FieldParameters;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 /// The errors in the motion that `[motion]` declares for service, and the largest motion with good errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,12 +18,40 @@ pub struct InMotion {
     pub ratio: f64,
     /// The worst axis over the noise floor with the correction by commanded speed and acceleration.
     pub corrected_ratio: f64,
-    /// Largest rms acceleration of all axes at once, m/s2, with rotations at [`ARM_M`].
-    pub acceleration_m_s2: f64,
-    /// Largest rms speed of all axes at once, m/s, with rotations at [`ARM_M`].
-    pub speed_m_s: f64,
+    /// The largest motion with good errors.
+    pub up_to: UpTo,
     /// What the log shows.
     pub fit: MotionFit,
+}
+
+/// The largest motion with good errors, rms, all axes at once, with rotations at [`ARM_M`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UpTo {
+    /// Acceleration, m/s2.
+    pub acceleration_m_s2: f64,
+    /// Speed, m/s.
+    pub speed_m_s: f64,
+    /// Whether the log shows the effect of acceleration.
+    pub shows_acceleration: bool,
+}
+
+/// The motion that `[motion]` declares for service.
+fn declared(stage: &Stage) -> ServiceMotion {
+    let [x, y, rz, ..] = stage.motion.axes;
+    ServiceMotion {
+        speed: [x, y, rz].map(|axis| axis.service_speed_rms),
+        acceleration: stage.motion.axes.map(|axis| axis.service_acceleration_rms),
+    }
+}
+
+/// Variances that these lags of A, B, C add to X, Y, Rz in service: m2, m2, rad2.
+pub fn by_lags(lags_s: [f64; 3], parameters: &FieldParameters, stage: &Stage) -> Option<[f64; 3]> {
+    let exact = MotionFit {
+        probe_lag_covariance: Matrix3::zeros(),
+        ..MotionFit::unknown().without_prior()
+    };
+    let late = exact.with_other_lags(lags_s);
+    late.variance(parameters, &declared(stage), false)
 }
 
 impl InMotion {
@@ -32,11 +62,7 @@ impl InMotion {
         stage: &Stage,
         at_rest: &Predicted,
     ) -> Option<Self> {
-        let [x, y, rz, ..] = stage.motion.axes;
-        let declared = ServiceMotion {
-            speed: [x, y, rz].map(|axis| axis.service_speed_rms),
-            acceleration: stage.motion.axes.map(|axis| axis.service_acceleration_rms),
-        };
+        let declared = declared(stage);
         let per_arm = 1.0 / ARM_M;
         let all = [1.0, 1.0, per_arm, 1.0, per_arm, per_arm];
         let variance = |speed, acceleration| {
@@ -60,8 +86,11 @@ impl InMotion {
             added: (fit.without_prior()).variance(parameters, &declared, false)?,
             ratio: (at_rest.with_added(fit.variance(parameters, &declared, false)?)).worst_ratio(),
             corrected_ratio: at_rest.with_added(corrected).worst_ratio(),
-            acceleration_m_s2: good_up_to(variance([0.0; 3], all)?),
-            speed_m_s: good_up_to(variance([1.0, 1.0, per_arm], [0.0; 6])?),
+            up_to: UpTo {
+                acceleration_m_s2: good_up_to(variance([0.0; 3], all)?),
+                speed_m_s: good_up_to(variance([1.0, 1.0, per_arm], [0.0; 6])?),
+                shows_acceleration: fit.shows_acceleration,
+            },
             fit: *fit,
         })
     }
@@ -73,9 +102,9 @@ impl InMotion {
         let kind = Kind::InMotion {
             ratio,
             corrected_ratio: self.corrected_ratio,
-            acceleration_m_s2: self.acceleration_m_s2,
-            speed_mm_s: self.speed_m_s * 1e3,
-            shows_acceleration: self.fit.shows_acceleration,
+            acceleration_m_s2: self.up_to.acceleration_m_s2,
+            speed_mm_s: self.up_to.speed_m_s * 1e3,
+            shows_acceleration: self.up_to.shows_acceleration,
             lag_us: self.fit.lags_behind_middle_s().map(|lag_s| lag_s * 1e6),
         };
         is_felt.then(|| Finding::new(kind).with_cost(ratio))

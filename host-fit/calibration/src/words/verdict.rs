@@ -1,7 +1,7 @@
 //! The meaning of a verdict.
 
 use crate::diagnose::Diagnosis;
-use crate::judge::in_motion::InMotion;
+use crate::judge::in_motion::UpTo;
 
 /// The errors in service, and how far from the temperature of the log they hold; `is_field` for the field model, which is
 /// made for service.
@@ -31,7 +31,7 @@ pub fn verdict(diagnosis: &Diagnosis, is_field: bool) -> String {
         let within_k = validity.within_k;
         format!("; good within {within_k:.0} K of the temperature of calibration")
     });
-    let moves = diagnosis.motion.filter(|motion| motion.speed_m_s > 0.0);
+    let moves = diagnosis.up_to.filter(|up_to| up_to.speed_m_s > 0.0);
     let motion = moves.map_or(String::new(), |motion| format!("; {}", up_to(&motion)));
     format!(
         "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}{motion}"
@@ -47,9 +47,9 @@ pub fn own_logs(names: &[String]) -> String {
 }
 
 /// The largest motion with good errors.
-pub fn up_to(motion: &InMotion) -> String {
+pub fn up_to(motion: &UpTo) -> String {
     let (acceleration, speed) = (motion.acceleration_m_s2, motion.speed_m_s * 1e3);
-    let open = match motion.fit.shows_acceleration {
+    let open = match motion.shows_acceleration {
         true => "",
         false => "; the log does not show the effect of more acceleration",
     };
