@@ -45,7 +45,7 @@ impl Calibration {
         let fit = outcome.fitted.as_ref().map_err(internal)?;
         Ok(Self {
             set: fit.set.clone(),
-            known: outcome.known(&log.dataset, &designed),
+            known: outcome.known(&log.dataset),
             designed,
             stage,
             origin: Origin::Fit(Box::new(OfFit {

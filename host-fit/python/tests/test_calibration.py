@@ -241,14 +241,14 @@ def test_a_recalibration_finds_no_change_in_the_same_stage_and_is_that_of_the_pr
     cal.save(tmp_path / "old.bin")
     host_fit(
         "recalibrate", "old.bin", DATA / "service.csv.gz", "--stage", DATA / "stage.toml", "--what", "gains",
-        "--out", "new.bin", "--created", "later",
+        "--out", "new.bin", "--created", "2026-11-26",
     )  # fmt: skip
-    new = cal.recalibrate(service, what="gains", created="later")
+    new = cal.recalibrate(service, what="gains", created="2026-11-26")
     new.save(tmp_path / "own.bin")
     for name in ["", ".posterior"]:
         assert (tmp_path / f"own.bin{name}").read_bytes() == (tmp_path / f"new.bin{name}").read_bytes()
     old = hs.Calibration.load(tmp_path / "old.bin", service.stage)
-    assert old.recalibrate(service, "gains", created="later").blob == new.blob
+    assert old.recalibrate(service, "gains", created="2026-11-26").blob == new.blob
     change = new.diff(cal)
     assert abs(change["parameters"]["eta_a"]["sigma"]) < 5 and not change["same_logs"]
     assert new.details is not None and new.details["what"] == "gains" and new.verdict == "good"

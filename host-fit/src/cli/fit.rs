@@ -88,6 +88,7 @@ impl FitJob<'_> {
         }
         let kept = self.out.filter(|_| outcome.has_blob);
         let kept = kept.zip(outcome.fitted.as_ref().ok());
+        let mut known = outcome.known(&log.dataset);
         page.add(&mut outputs, || {
             let what = (self.title, self.order.settings.serial.as_str());
             let mut source = page.source(what, logs, log_and_stage, subject);
@@ -100,16 +101,15 @@ impl FitJob<'_> {
                 let blob = blob_file::to_bytes(path, &fit.set)?;
                 let provenance = &mut source.provenance;
                 provenance.add_bytes(path, &blob, "parameter blob, written");
+                source.certificate = kept::certificate(path, &fit.set);
+            }
+            if let (Some(known), Some(number)) = (&mut known, source.number()) {
+                known.certificate = number;
             }
             Ok(source.html()?)
         })?;
         if let Some((path, fit)) = kept {
-            posterior_file::add_calibration(
-                &mut outputs,
-                path,
-                &fit.set,
-                outcome.known(&log.dataset, &stage).as_ref(),
-            )?;
+            posterior_file::add_calibration(&mut outputs, path, &fit.set, known.as_ref())?;
         }
         let mut details = Vec::new();
         if let Some(report) = &report {

@@ -77,7 +77,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let log = args.logs.read(&stage, options)?;
     let created = args.report.created.clone().unwrap_or_default();
     let blob = (&old, known.as_ref());
-    let updated = match Updated::new(blob, &log, &stage, args.what, created) {
+    let mut updated = match Updated::new(blob, &log, &stage, args.what, created) {
         Ok(updated) => updated,
         Err(cause) => {
             as_found(args, blob, &stage, &cause)?;
@@ -86,7 +86,8 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     };
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &updated.figures)?;
-    let (set, known) = (&updated.new.set, updated.new.known.as_ref());
+    let set = &updated.new.set;
+    let mut number = None;
     let (report, as_found) = updated.report(&old, &log, &stage);
     args.report.add(&mut outputs, || {
         let what = (CERTIFICATE, set.serial.as_str());
@@ -105,9 +106,14 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         source.as_found = Some(as_found);
         let before = blob.1.map(|known| known.certificate.clone());
         source.certificate = before.unwrap_or_default();
+        number = source.number();
         Ok(source.html()?)
     })?;
+    if let (Some(known), Some(number)) = (&mut updated.new.known, number) {
+        known.certificate = number;
+    }
     if updated.refusal.is_none() {
+        let (set, known) = (&updated.new.set, updated.new.known.as_ref());
         posterior_file::add_calibration(&mut outputs, &args.out, set, known)?;
     }
     terminal::print(&as_text(&[updated.gains()]))?;

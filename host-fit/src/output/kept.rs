@@ -1,8 +1,9 @@
 //! Files that a command does not replace: it did not write them, so they may hold a measurement.
 
-use super::blob_file;
 use super::error::{OutputError, OutputProblem};
+use super::{blob_file, posterior_file};
 use flate2::read::MultiGzDecoder;
+use runtime::ParameterSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -49,6 +50,13 @@ pub fn check_own_blob(path: &Path, serial: &str) -> Result<(), OutputError> {
         Some(there) => Err(OutputError::new(path, OutputProblem::OtherSerial(there))),
         None => Ok(()),
     }
+}
+
+/// The number of the certificate of another blob than this one that is there; empty without one.
+pub fn certificate(path: &Path, set: &ParameterSet) -> String {
+    let there = blob_file::read(path).ok().filter(|there| there != set);
+    let known = there.and_then(|there| posterior_file::read(&there, path).ok()?);
+    known.map_or(String::new(), |known| known.certificate)
 }
 
 /// The first bytes of a file, unpacked; none of devices and pipes.

@@ -6,6 +6,7 @@
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
 use hallstage_calibration::budget::Budget;
+use hallstage_calibration::judge::in_motion::UpTo;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::source::{SourceError, read_whole};
 use hallstage_solver::estimator::terms::COUNT;
@@ -22,7 +23,7 @@ const ROWS: [usize; 2] = [COUNT, COUNT + 6];
 /// The file has lengths in mm and angles in mrad.
 const MM_PER_M: f64 = 1e3;
 /// Largest file that is read.
-const BYTES_MAX: u64 = 1 << 16;
+const BYTES_MAX: u64 = 1 << 20;
 
 /// What the file holds.
 #[derive(Serialize, Deserialize)]
@@ -40,8 +41,9 @@ struct Content {
     /// The faults of the log that the calibration is without.
     repaired: Vec<String>,
     budget: Option<Budget>,
-    /// SHA-256 of the text of each log that the blob was fitted to.
-    logs: Vec<[u8; 32]>,
+    up_to: Option<UpTo>,
+    /// Marks of the logs that the blob was fitted to.
+    marks: Vec<u32>,
     /// The latest number of a certificate; empty without one.
     certificate: String,
 }
@@ -164,7 +166,8 @@ pub fn to_bytes(blob: &[u8], known: &StoredPosterior) -> Vec<u8> {
         triangle: (rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]))).collect(),
         repaired: known.repaired.clone(),
         budget: known.budget.clone(),
-        logs: known.logs.clone(),
+        up_to: known.up_to,
+        marks: known.marks.clone(),
         certificate: known.certificate.clone(),
     };
     // Into memory it does not fail.
@@ -220,7 +223,8 @@ pub fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         misfit,
         repaired: content.repaired,
         budget,
-        logs: content.logs,
+        up_to: content.up_to,
+        marks: content.marks,
         certificate: content.certificate,
     };
     Ok((content.blob, known))
@@ -255,7 +259,8 @@ mod tests {
             misfit: 1.02,
             repaired: Vec::new(),
             budget: None,
-            logs: vec![[3; 32]],
+            up_to: None,
+            marks: vec![3],
             certificate: "7".to_owned(),
         }
     }

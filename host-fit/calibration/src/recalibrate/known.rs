@@ -1,12 +1,17 @@
-//! What is kept beside a blob: its posterior, the logs that it was fitted to, and its certificate.
+//! What is kept beside a blob: its posterior, marks of the rows that it was fitted to, and its certificate.
 
 use crate::budget::Budget;
 use crate::fit::Fit;
-use hallstage_input::dataset::{Dataset, LogSource};
-use hallstage_input::stage::Stage;
+use crate::judge::in_motion::UpTo;
+use hallstage_input::dataset::{Dataset, LogSource, Row};
 use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::ParameterSet;
+
+/// Marks of a log.
+const MARKS: usize = 256;
+/// Marks that a log and the logs of a fit share only where it is one of them, or a part: 1 s of 30.
+const SHARED_MIN: usize = 8;
 
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +27,10 @@ pub struct StoredPosterior {
     pub repaired: Vec<String>,
     /// The uncertainty in service, source by source.
     pub budget: Option<Budget>,
-    /// SHA-256 of the text of each log that the blob was fitted to.
-    pub logs: Vec<[u8; 32]>,
+    /// The largest motion with good errors, without correction.
+    pub up_to: Option<UpTo>,
+    /// Marks of the logs that the blob was fitted to.
+    pub marks: Vec<u32>,
     /// The latest number of a certificate of it or of the calibrations before it; empty without one.
     pub certificate: String,
 }
@@ -42,40 +49,64 @@ impl StoredPosterior {
             misfit: score.chi_squared / score.residuals.max(1) as f64,
             repaired: Vec::new(),
             budget: None,
-            logs: Vec::new(),
+            up_to: None,
+            marks: Vec::new(),
             certificate: String::new(),
         })
     }
 
-    /// The same of a blob that was fitted to these logs, too. A number in `[certificate]` becomes the latest number of a
-    /// certificate, which no later document can have.
+    /// The same of a blob that was fitted to these logs, too.
     #[must_use]
-    pub fn with_log(&self, dataset: &Dataset, stage: &Stage) -> Self {
-        let mut logs = self.logs.clone();
-        logs.extend(dataset.logs.iter().map(|log| log.sha256));
-        let [number, ..] = &stage.certificate.texts;
-        let certificate = match number.as_str() {
-            "" => self.certificate.clone(),
-            number => number.to_owned(),
-        };
-        Self {
-            logs,
-            certificate,
-            ..self.clone()
+    pub fn with_logs(mut self, dataset: &Dataset) -> Self {
+        for log in &dataset.logs {
+            self.marks.extend(marks(dataset, log).iter().take(MARKS));
         }
+        self
     }
 }
 
-/// The names of the logs that a blob was fitted to: they are no evidence of it.
+/// A hash of the codes of each row that has no equal in its log, in ascending order. The first ones mark the log: they are rows
+/// at random, so an excerpt, in whatever form, has its share of them.
+fn marks(dataset: &Dataset, log: &LogSource) -> Vec<u32> {
+    let rows = dataset.rows.get(log.rows.clone()).unwrap_or_default();
+    let mark = |row: &Row| {
+        let vertical = row
+            .frame
+            .vertical
+            .map(|pose| pose.to_array().map(f32::to_bits));
+        let codes = row
+            .frame
+            .capacitive()
+            .unwrap_or_default()
+            .map(i32::cast_unsigned);
+        let hall = row.frame.hall().map(i32::cast_unsigned);
+        let words = [hall, vertical.unwrap_or(codes)].concat().into_iter();
+        // FNV-1a by words, and the mixing of MurmurHash3, so that the smallest ones are spread over the log.
+        let hash = words.fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| {
+            (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3)
+        });
+        let mixed = (hash ^ hash >> 33).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        (mixed >> 32) as u32
+    };
+    let mut all: Vec<u32> = rows.iter().map(mark).collect();
+    all.sort_unstable();
+    let alone = all.chunk_by(PartialEq::eq).filter(|same| same.len() == 1);
+    alone.map(|same| same[0]).collect()
+}
+
+/// The names of the logs that a blob was fitted to, whole or in part: they are no evidence of it.
 pub fn own_logs(
     set: &ParameterSet,
     known: Option<&StoredPosterior>,
     dataset: &Dataset,
 ) -> Vec<String> {
-    let are_all = set.logs_sha256 == dataset.sha256;
-    let of_fit = known.map_or(&[][..], |known| &known.logs);
-    let is_own =
-        |log: &&LogSource| are_all || log.sha256 == set.logs_sha256 || of_fit.contains(&log.sha256);
+    let is_same = set.logs_sha256 == dataset.sha256;
+    let of_fit = known.map_or(&[][..], |known| &known.marks);
+    let is_own = |log: &&LogSource| {
+        let marks = marks(dataset, log);
+        let shared = marks.iter().filter(|mark| of_fit.contains(mark)).count();
+        is_same || log.sha256 == set.logs_sha256 || shared >= SHARED_MIN
+    };
     let own = dataset.logs.iter().filter(is_own);
     own.map(LogSource::name).collect()
 }
