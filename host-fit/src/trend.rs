@@ -2,12 +2,13 @@
 //!
 //! The same codes are decoded by each blob. For each pose of a grid over the service of `[motion]`, the changes since the first
 //! blob are a line over time, by least squares. The drift of an axis is the slope, rms over the grid. The errors e in service of
-//! the last blob grow with it, to sqrt(e^2 + (drift t)^2) after the time t.
+//! the last blob grow with it, to sqrt(e^2 + (drift t)^2) after the time t. Where two levels describe the changes far better than
+//! a line, the axis has jumped, and has no drift.
 
 pub mod shown;
 
 use crate::diff::on_grid;
-use hallstage_calibration::judge::verdict::LIMITED_MAX;
+use crate::report::decision::Decision;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::paper::Parameters;
@@ -15,11 +16,14 @@ use hallstage_solver::estimator::terms::{ETA, PER_PROBE};
 use jiff::civil::{Date, DateTime};
 use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
+use nalgebra::{DMatrix, DVector};
 use runtime::ParameterSet;
 
 /// A later date is none.
 const DAYS_MAX: f64 = 36_525.0;
 const DAY_S: f64 = 86_400.0;
+/// Odds of two levels against a line above which an axis has jumped, for each place where it may have.
+const JUMP_MIN: f64 = 20.0;
 
 /// A blob with its name, and what is known of it.
 pub type Blob = (String, ParameterSet, Option<StoredPosterior>);
@@ -44,6 +48,14 @@ pub enum TrendError {
         serial: String,
         /// The serial number of the first blob.
         first: String,
+    },
+    /// A log counts twice.
+    #[error("{name} and {other} are calibrations by the same log: name one of them")]
+    SameLog {
+        /// A blob.
+        name: String,
+        /// Another one.
+        other: String,
     },
     /// The blobs have one date, or decode no pose.
     #[error("a trend needs blobs of two dates that decode the poses of the service of [motion]")]
@@ -76,6 +88,8 @@ pub struct Drift {
     pub limit: Option<f64>,
     /// Days from the last calibration to the limit: by the line, at the earliest and at the latest.
     pub days: [Option<f64>; 3],
+    /// The first calibration after a jump, and the jump, rms over service, m or rad. A line does not describe it.
+    pub jump: Option<(usize, f64)>,
 }
 
 /// Calibrations of one stage in the order of their dates.
@@ -85,139 +99,169 @@ pub struct Trend {
     pub calibrations: Vec<Calibration>,
     /// The drift of X, Y, Rz.
     pub drifts: [Drift; 3],
+    /// The name of the last blob if its errors in service are not known.
+    pub unknown: Option<String>,
+}
+
+/// The date of a blob. A time with a zone is an instant, and has the date of UTC.
+pub fn date(created: &str) -> Option<DateTime> {
+    let instant = created
+        .parse()
+        .map(|time: Timestamp| TimeZone::UTC.to_datetime(time));
+    instant.or_else(|_| created.parse()).ok()
 }
 
 impl Trend {
-    /// The trend of blobs. Errors have the limits of `[certificate]` without guard bands, and 1.30 times the noise floor.
+    /// The trend of blobs. Their errors have the limits of a calibration that is left as the last blob is.
     ///
     /// # Errors
     /// See [`TrendError`].
     pub fn new(blobs: &[Blob], stage: &Stage) -> Result<Self, TrendError> {
-        let dated = |blob| -> Result<(DateTime, &Blob), TrendError> {
-            let (name, set, _): &Blob = blob;
-            let of_zone = |time: Timestamp| TimeZone::UTC.to_datetime(time);
-            let date = set
-                .created
-                .parse()
-                .or_else(|_| set.created.parse().map(of_zone));
-            let date = date.map_err(|_| TrendError::NoDate {
+        let mut dated = Vec::new();
+        for (k, blob) in blobs.iter().enumerate() {
+            let (name, set, _) = blob;
+            let date = date(&set.created).ok_or_else(|| TrendError::NoDate {
                 name: name.clone(),
                 created: set.created.to_string(),
-            });
-            Ok((date?, blob))
-        };
-        let mut blobs = blobs.iter().map(dated).collect::<Result<Vec<_>, _>>()?;
-        blobs.sort_by_key(|(date, _)| *date);
-        let [(first, (_, first_set, _)), .., (_, last)] = blobs.as_slice() else {
+            })?;
+            let (_, first, _) = &blobs[0];
+            if set.serial != first.serial {
+                return Err(TrendError::OtherStage {
+                    name: name.clone(),
+                    serial: set.serial.to_string(),
+                    first: first.serial.to_string(),
+                });
+            }
+            let same = |(_, other, _): &&Blob| other.logs_sha256 == set.logs_sha256;
+            if let Some((other, ..)) = blobs[..k].iter().find(same) {
+                let (name, other) = (name.clone(), other.clone());
+                return Err(TrendError::SameLog { name, other });
+            }
+            dated.push((date, blob));
+        }
+        dated.sort_by_key(|(date, _)| *date);
+        let [
+            (start, (_, first, first_known)),
+            ..,
+            (_, (last, _, last_known)),
+        ] = dated.as_slice()
+        else {
             return Err(TrendError::NoLine);
         };
-        if let Some((_, (name, set, _))) = blobs
-            .iter()
-            .find(|(_, blob)| blob.1.serial != first_set.serial)
-        {
-            return Err(TrendError::OtherStage {
-                name: name.clone(),
-                serial: set.serial.to_string(),
-                first: first_set.serial.to_string(),
-            });
-        }
-        let eta = |set: &ParameterSet| Parameters::from_set(set).eta();
-        let first_eta = eta(first_set);
-        let calibration = |(date, (_, set, known)): &(DateTime, &Blob)| {
-            let eta = eta(set);
-            let gain = |probe: usize| {
+        let gains = |set: &ParameterSet, known: Option<&StoredPosterior>| {
+            let eta = Parameters::from_set(set).eta();
+            [0, 1, 2].map(|probe: usize| {
                 let row = probe * PER_PROBE + ETA;
-                let error = known
-                    .as_ref()
-                    .map(|known| known.covariance[(row, row)].sqrt());
-                let part = |x: f64| x / first_eta[probe];
-                (part(eta[probe]) - 1.0, error.map(part))
+                (eta[probe], known.map(|known| known.covariance[(row, row)]))
+            })
+        };
+        let before = gains(first, first_known.as_ref());
+        let calibration = |(date, (_, set, known)): &(DateTime, &Blob)| {
+            let after = gains(set, known.as_ref());
+            let change = |probe: usize| {
+                let ((old, of_old), (new, of_new)) = (before[probe], after[probe]);
+                let error = of_old.zip(of_new).filter(|_| date != start);
+                let error = error.map(|(old, new)| (old + new).sqrt());
+                (new / old - 1.0, error.map(|error| error / old))
             };
             let budget = known.as_ref().and_then(|known| known.budget.as_ref());
             Calibration {
                 date: *date,
-                day: date.duration_since(*first).as_secs_f64() / DAY_S,
-                gains: [0, 1, 2].map(gain),
+                day: date.duration_since(*start).as_secs_f64() / DAY_S,
+                gains: [0, 1, 2].map(change),
                 moved: [0.0; 3],
                 errors: budget.map_or(set.fit.rms.map(f64::from), |of| of.in_service()),
             }
         };
-        let mut calibrations: Vec<_> = blobs.iter().map(calibration).collect();
-        let sets: Vec<_> = blobs.iter().map(|(_, blob)| &blob.1).collect();
-        let lines = lines(&sets, &mut calibrations, stage).ok_or(TrendError::NoLine)?;
-        let budget = last.2.as_ref().and_then(|known| known.budget.as_ref());
-        let errors = calibrations[calibrations.len() - 1].errors;
+        let mut calibrations: Vec<_> = dated.iter().map(calibration).collect();
+        let sets: Vec<_> = dated.iter().map(|(_, blob)| &blob.1).collect();
+        let products = products(&sets, stage).ok_or(TrendError::NoLine)?;
+        let days: Vec<f64> = calibrations.iter().map(|of| of.day).collect();
+        for (k, of) in calibrations.iter_mut().enumerate() {
+            of.moved = products.each_ref().map(|products| products[(k, k)].sqrt());
+        }
+        let table = &stage.certificate;
+        let budget = last_known.as_ref().and_then(|known| known.budget.as_ref());
+        let decision = budget.map_or(Decision::on_log(table.limits), |budget| {
+            let by = (&budget.predicted(), Some(budget));
+            Decision::in_service(table.limits, table.is_guarded, by, None)
+        });
+        let errors = calibrations[sets.len() - 1].errors;
         let drift = |axis: usize| {
-            let usual = budget.map(|of| LIMITED_MAX * of.noise()[axis]);
-            // The smaller, as a fit takes it.
-            let limits = [stage.certificate.limits[axis], usual];
-            let limit = limits.into_iter().flatten().reduce(f64::min);
-            drift(lines[axis], sets.len() - 2, errors[axis], limit)
+            let reached = (errors[axis], decision.accepted(axis));
+            drift(&products[axis], &days, reached).ok_or(TrendError::NoLine)
         };
         Ok(Self {
-            drifts: [0, 1, 2].map(drift),
+            drifts: [drift(0)?, drift(1)?, drift(2)?],
             calibrations,
+            unknown: budget.is_none().then(|| last.clone()),
         })
     }
 
     /// The date a number of days after the last calibration.
     pub fn date_after(&self, days: f64) -> Option<Date> {
         let time = SignedDuration::from_secs((days * DAY_S) as i64);
-        Some(
-            self.calibrations
-                .last()?
-                .date
-                .checked_add(time)
-                .ok()?
-                .date(),
-        )
+        let last = self.calibrations.last()?;
+        Some(last.date.checked_add(time).ok()?.date())
     }
 }
 
-/// Mean square over the grid of the slopes of X, Y, Rz by day, and the variance of a slope, times its degrees of freedom, by the
-/// scatter about the lines. Sets how far the poses have moved. `None` without a line.
-fn lines(
-    sets: &[&ParameterSet],
-    calibrations: &mut [Calibration],
-    stage: &Stage,
-) -> Option<[[f64; 2]; 3]> {
-    let count = sets.len() as f64;
-    let mean_day = calibrations.iter().map(|of| of.day).sum::<f64>() / count;
-    let days: Vec<f64> = calibrations.iter().map(|of| of.day - mean_day).collect();
-    let spread: f64 = days.iter().map(|day| day * day).sum();
-    let (mut poses, mut sums) = (0.0, [[0.0; 2]; 3]);
+/// For X, Y, Rz the products of the changes of two calibrations since the first, as means over the grid; `None` where a blob
+/// decodes no pose.
+fn products(sets: &[&ParameterSet], stage: &Stage) -> Option<[DMatrix<f64>; 3]> {
+    let (mut poses, mut products) = (0.0, [0; 3].map(|_| DMatrix::zeros(sets.len(), sets.len())));
     // Levels with half the range as their rms, as in service.
     let range_si = stage.motion.axes.map(|axis| 0.5f64.sqrt() * axis.service);
     on_grid(sets, range_si, |read| {
         let Some(read) = read else { return };
         poses += 1.0;
-        for (axis, [slopes, scatter]) in sums.iter_mut().enumerate() {
-            let change = |k: usize| read[k][axis] - read[0][axis];
-            let mean = (0..sets.len()).map(change).sum::<f64>() / count;
-            let weighted = days.iter().enumerate().map(|(k, day)| day * change(k));
-            let slope = weighted.sum::<f64>() / spread;
-            *slopes += slope * slope;
-            for (k, (day, of)) in days.iter().zip(calibrations.iter_mut()).enumerate() {
-                of.moved[axis] += change(k).powi(2);
-                *scatter += (change(k) - mean - slope * day).powi(2) / spread;
-            }
+        for (axis, sum) in products.iter_mut().enumerate() {
+            let changes = read.iter().map(|pose| pose[axis] - read[0][axis]);
+            let changes = DVector::from_iterator(sets.len(), changes);
+            *sum += &changes * changes.transpose();
         }
     })?;
-    for moved in calibrations.iter_mut().flat_map(|of| &mut of.moved) {
-        *moved = (*moved / poses).sqrt();
-    }
-    let sums = sums.map(|of_axis| of_axis.map(|sum| sum / poses));
-    sums.as_flattened()
-        .iter()
-        .all(|sum| sum.is_finite())
-        .then_some(sums)
+    Some(products.map(|sum| sum / poses)).filter(|_| poses > 0.0)
 }
 
-/// The drift by the lines of an axis, and when an error in service reaches the limit.
-fn drift([slope, scatter]: [f64; 2], freedom: usize, error: f64, limit: Option<f64>) -> Drift {
-    let variance = scatter / freedom.max(1) as f64;
+/// The drift of an axis by the products of its changes on these days, and when an error in service reaches its limit. `None`
+/// without a line.
+fn drift(
+    products: &DMatrix<f64>,
+    days: &[f64],
+    (error, limit): (f64, Option<f64>),
+) -> Option<Drift> {
+    let count = days.len();
+    // The square of what the changes have of a course about its mean, the square of its length, and the changes without it.
+    let fitted = |course: &dyn Fn(usize) -> f64| {
+        let course = DVector::from_fn(count, |k, _| course(k));
+        let course = course.add_scalar(-course.mean());
+        let square = course.norm_squared();
+        let part = (course.transpose() * products * &course)[0] / square;
+        let all = products.trace() - products.sum() / count as f64;
+        (part, square, (all - part).max(0.0))
+    };
+    let (part, spread, scatter) = fitted(&|k| days[k]);
+    if !(part.is_finite() && scatter.is_finite()) {
+        return None;
+    }
+    let jump = |first: usize| {
+        let (part, square, left) = fitted(&|k| f64::from(k >= first));
+        (first, (part / square).sqrt(), left)
+    };
+    let jumps = (1..count).map(jump);
+    let jump = jumps
+        .min_by(|a, b| a.2.total_cmp(&b.2))
+        .filter(|(.., left)| {
+            // Odds by the likelihoods, each with its own variance.
+            let places = (count - 1) as f64;
+            count > 2 && scatter > left * (JUMP_MIN * places).powf(2.0 / count as f64)
+        });
+    let jump = jump.map(|(first, size, _)| (first, size));
+    let freedom = count - 2;
+    let variance = scatter / spread / freedom.max(1) as f64;
     // The scatter adds to the square of a slope.
-    let per_day = (slope - variance).max(0.0).sqrt();
+    let per_day = (part / spread - variance).max(0.0).sqrt();
     let half = student(freedom) * variance.sqrt();
     let ends = [(per_day - half).max(0.0), per_day + half];
     let interval = (freedom > 0).then_some(ends);
@@ -226,15 +270,16 @@ fn drift([slope, scatter]: [f64; 2], freedom: usize, error: f64, limit: Option<f
         let room = (limit * limit - error * error).max(0.0).sqrt();
         // Beyond the limit no drift is needed.
         let days = if room > 0.0 { room / per_day } else { 0.0 };
-        Some(days).filter(|days| *days < DAYS_MAX)
+        Some(days).filter(|days| *days < DAYS_MAX && (jump.is_none() || *days == 0.0))
     };
     let [latest, earliest] = interval.unwrap_or([per_day; 2]);
-    Drift {
+    Some(Drift {
         per_day,
         interval,
         limit,
         days: [per_day, earliest, latest].map(days),
-    }
+        jump,
+    })
 }
 
 /// The two-sided 95 % quantile of Student's t.

@@ -8,6 +8,7 @@ use crate::report::page::{Source, facts};
 use crate::report::provenance::Provenance;
 use crate::report::table::Table;
 use crate::report::verdict::{Subject, Summary};
+use crate::trend;
 use clap::Args;
 use hallstage_calibration::words;
 use hallstage_input::log::LogReading;
@@ -27,9 +28,9 @@ pub(super) struct ReportArgs {
     /// A line for the report, as --note "probe B=serial 1234"; may be given several times.
     #[arg(long = "note", value_name = "KEY=VALUE", requires = "report", value_parser = note)]
     pub(super) notes: Vec<(String, String)>,
-    /// Date and time for blob and report, as you want them to read; at most 32 bytes. The program
+    /// Date, or date and time, for blob and report: 2026-11-26 or 2026-11-26T10:00:00+01:00. The program
     /// does not look at the clock: the same command gives the same bytes.
-    #[arg(long, value_name = "TIME", value_parser = blob_text)]
+    #[arg(long, value_name = "TIME", value_parser = date)]
     pub(super) created: Option<Text>,
 }
 
@@ -40,6 +41,12 @@ fn note(text: &str) -> Result<(String, String), &'static str> {
         }
         _ => Err("expected KEY=VALUE"),
     }
+}
+
+fn date(text: &str) -> Result<Text, &'static str> {
+    let is_date = trend::date(text).is_some();
+    let text = blob_text(text)?;
+    (is_date.then_some(text)).ok_or("write a date as 2026-11-26 or 2026-11-26T10:00:00+01:00")
 }
 
 impl ReportArgs {

@@ -56,6 +56,7 @@ pub(super) fn run(args: &TrendArgs) -> Result<(), HostError> {
         Ok(shown::page(&trend, args.report.facts(serial), provenance)?)
     })?;
     super::wrote(outputs.commit()?)?;
+    terminal::warn(&shown::warnings(&trend));
     let answer = shown::answer(&trend);
     terminal::print(&format!("{answer}\n{}", as_text(&figures.tables())))
 }

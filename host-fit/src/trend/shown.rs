@@ -1,14 +1,14 @@
 //! The trend as figures and as a page.
 
 use super::{Calibration, Drift, Trend};
-use crate::report::axis::Axis;
+use crate::report::axis;
 use crate::report::chart::{Chart, Mark, Tone};
 use crate::report::errors::pose;
 use crate::report::figure::{Group, figure, group, micro};
 use crate::report::html::{Page, Section};
 use crate::report::provenance::Provenance;
 use crate::report::verdict::Summary;
-use hallstage_input::axis::{PLANAR, sign};
+use hallstage_input::axis::{Axis, PLANAR, sign};
 use minijinja::Error;
 
 /// A month, days.
@@ -25,32 +25,80 @@ fn first_to_end(trend: &Trend) -> Option<(usize, &Drift)> {
 }
 
 /// The dates of a limit: by the line, at the earliest and at the latest.
-fn dates(trend: &Trend, drift: &Drift) -> [String; 3] {
-    drift.days.map(|days| {
-        let date = days.and_then(|days| trend.date_after(days));
-        date.map_or("no date".to_owned(), |date| date.to_string())
-    })
+fn dates(trend: &Trend, drift: &Drift) -> [Option<String>; 3] {
+    drift
+        .days
+        .map(|days| Some(trend.date_after(days?)?.to_string()))
+}
+
+/// The dates between which an axis has jumped, and the jump.
+fn jump(trend: &Trend, (axis, drift): (usize, &Drift)) -> Option<String> {
+    let (first, size) = drift.jump?;
+    let [from, to] = [first - 1, first].map(|k| trend.calibrations[k].date.date());
+    let Axis { name, micro, .. } = &PLANAR[axis];
+    let (size, unit) = (size * 1e6, sign(micro));
+    Some(format!(
+        "{name} jumped by {size:.2} {unit} (rms) between {from} and {to}"
+    ))
 }
 
 /// What the trend says, in a line.
 pub fn answer(trend: &Trend) -> String {
-    let Some((axis, drift)) = first_to_end(trend) else {
-        return "No limit will be reached: there is none, or no drift.".to_owned();
+    let jumps = trend.drifts.iter().enumerate();
+    let jumps: Vec<String> = jumps.filter_map(|drift| jump(trend, drift)).collect();
+    let jumped = match jumps.is_empty() {
+        true => String::new(),
+        false => format!(
+            "{}: a line does not describe this, and gives no date. ",
+            jumps.join(", ")
+        ),
     };
-    let [date, earliest, latest] = dates(trend, drift);
+    let reached = match first_to_end(trend) {
+        Some(first) => reached(trend, first),
+        None if !jumps.is_empty() => String::new(),
+        None => "No limit will be reached: there is none, or no drift.".to_owned(),
+    };
+    format!("{jumped}{reached}").trim_end().to_owned()
+}
+
+/// When an axis reaches its limit.
+fn reached(trend: &Trend, (axis, drift): (usize, &Drift)) -> String {
     let axis = &PLANAR[axis];
     let limit = drift.limit.unwrap_or_default() * 1e6;
-    let interval = match drift.interval {
-        Some(_) => format!("between {earliest} and {latest} (95 %)"),
-        None => "a line through two calibrations has no interval".to_owned(),
-    };
     let (name, unit) = (axis.name, sign(axis.micro));
+    let errors = format!("Errors of {name} in service");
     if drift.days[0] == Some(0.0) {
-        return format!("Errors of {name} in service are beyond their limit of {limit:.2} {unit}.");
+        return format!("{errors} are beyond their limit of {limit:.2} {unit}.");
     }
-    format!(
-        "Errors of {name} in service reach their limit of {limit:.2} {unit} on {date}; {interval}."
-    )
+    let limit = format!("their limit of {limit:.2} {unit}");
+    match (dates(trend, drift), drift.interval) {
+        ([Some(date), ..], None) => format!(
+            "{errors} reach {limit} on {date}; a line through two calibrations has no interval."
+        ),
+        ([Some(date), Some(earliest), Some(latest)], _) => {
+            format!("{errors} reach {limit} on {date}; between {earliest} and {latest} (95 %).")
+        }
+        ([Some(date), Some(earliest), None], _) => {
+            format!("{errors} reach {limit} on {date}; not before {earliest}, or never (95 %).")
+        }
+        ([None, Some(earliest), _], _) => {
+            format!(
+                "{errors} may reach {limit} from {earliest} on (95 %); by the line they do not."
+            )
+        }
+        _ => format!("{errors} reach {limit} after the last year of the calendar."),
+    }
+}
+
+/// What the user should know: without the posterior of the last blob, errors and limits are other ones.
+pub fn warnings(trend: &Trend) -> Vec<String> {
+    let warning = trend.unknown.iter().map(|name| {
+        format!(
+            "{name}, the last blob, has no posterior beside it: its errors are those on its log, not in service, and 1.30 times the \
+             noise is no limit. Copy {name}.posterior there."
+        )
+    });
+    warning.collect()
 }
 
 /// All figures: a row for each axis, and one for each calibration.
@@ -59,17 +107,21 @@ pub fn figures(trend: &Trend) -> Group {
         let axis = &PLANAR[k];
         let [reached, earliest, latest] = dates(trend, drift);
         let a_month = |x: f64| micro(axis, x * MONTH);
-        let interval = drift.interval;
+        // A line does not describe a jump.
+        let interval = drift.interval.filter(|_| drift.jump.is_none());
+        let per_day = drift.jump.is_none().then_some(drift.per_day);
         group! {
             "axis" => axis.name,
             "error" => trend.calibrations.last().map(|last| micro(axis, last.errors[k])),
             "limit" => drift.limit.map(|limit| micro(axis, limit)),
-            "drift_a_month" => a_month(drift.per_day),
+            "drift_a_month" => per_day.map(a_month),
             "from" => interval.map(|[low, _]| a_month(low)),
             "to" => interval.map(|[_, high]| a_month(high)),
             "reached" => reached,
-            "earliest" => interval.map(|_| earliest),
-            "latest" => interval.map(|_| latest),
+            "earliest" => interval.and(earliest),
+            "latest" => interval.and(latest),
+            "jump" => drift.jump.map(|(_, size)| micro(axis, size)),
+            "after" => drift.jump.map(|(first, _)| trend.calibrations[first - 1].date.date().to_string()),
         }
     };
     let calibration = |of: &Calibration| {
@@ -91,7 +143,7 @@ pub fn figures(trend: &Trend) -> Group {
 }
 
 /// Gains of the probes over time, with two standard errors to both sides.
-fn gains(trend: &Trend, days: Axis) -> Chart {
+fn gains(trend: &Trend, days: axis::Axis) -> Chart {
     let panel = |probe: usize| {
         let points = trend
             .calibrations
@@ -111,8 +163,21 @@ fn gains(trend: &Trend, days: Axis) -> Chart {
     Chart::new(caption, ("days since the first calibration", days), panel)
 }
 
+/// The errors of an axis from the last calibration to a day, as they grow with the drift: um or urad.
+pub(super) fn forecast(trend: &Trend, axis: usize, end: f64) -> Vec<(f64, f64)> {
+    let Some(last) = trend.calibrations.last() else {
+        return Vec::new();
+    };
+    let point = |k: u32| {
+        let after = (end - last.day) * f64::from(k) / f64::from(POINTS);
+        let error = last.errors[axis].hypot(trend.drifts[axis].per_day * after);
+        (last.day + after, error * 1e6)
+    };
+    (0..=POINTS).map(point).collect()
+}
+
 /// Poses and errors over time; the errors go on with the drift.
-fn errors(trend: &Trend, days: Axis) -> Chart {
+fn errors(trend: &Trend, days: axis::Axis) -> Chart {
     let panel = |axis: usize| {
         let drift = &trend.drifts[axis];
         let points = |of: fn(&Calibration) -> [f64; 3]| -> Vec<(f64, f64)> {
@@ -120,11 +185,9 @@ fn errors(trend: &Trend, days: Axis) -> Chart {
             points.map(|at| (at.day, of(at)[axis] * 1e6)).collect()
         };
         let mut errors = points(|of| of.errors);
-        if let Some((from, error)) = errors.last().copied() {
-            errors.extend((1..=POINTS).map(|k| {
-                let after = (days.1 - from) * f64::from(k) / f64::from(POINTS);
-                (from + after, error.hypot(drift.per_day * after * 1e6))
-            }));
+        // A line does not go on from a jump.
+        if drift.jump.is_none() {
+            errors.extend(forecast(trend, axis, days.1));
         }
         let mut marks = vec![
             Mark::Line(Tone::Data, points(|of| of.moved)),
@@ -150,11 +213,13 @@ pub fn page(
     mut provenance: Provenance,
 ) -> Result<String, Error> {
     let last_day = trend.calibrations.last().map_or(0.0, |last| last.day);
-    let end = first_to_end(trend).and_then(|(_, drift)| drift.days[0]);
+    let first = first_to_end(trend).map(|(_, drift)| drift);
+    let end = first.and_then(|drift| drift.days[0]);
+    let is_open = first.is_some() || trend.drifts.iter().any(|drift| drift.jump.is_some());
     // As far again as the calibrations reach, or a little beyond the limit.
     let beyond = end.map_or(last_day, |end| (1.1 * end).min(2.0 * last_day));
-    let days = Axis(0.0, last_day + beyond);
-    let mark = if end.is_some() { "limited" } else { "good" };
+    let days = axis::Axis(0.0, last_day + beyond);
+    let mark = if is_open { "limited" } else { "good" };
     let note = "Moved: the pose that the same codes give, against the first calibration, rms over service. Error: rms in service, or on \
                 the log of a calibration without a posterior. From and to: 95 % of the drift.";
     let number = provenance.document(&facts);
@@ -168,7 +233,7 @@ pub fn page(
         first: Vec::new(),
         facts,
         causes: None,
-        warnings: &[],
+        warnings: &warnings(trend),
         sections: vec![
             Section {
                 title: "Over time",

@@ -1,5 +1,12 @@
 use super::*;
+use crate::report::provenance::Provenance;
+use hallstage_calibration::budget::Budget;
+use hallstage_calibration::judge::predicted::{Predicted, declared_service};
 use hallstage_input::shipped;
+use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::posterior::Posterior;
+use hallstage_solver::estimator::terms::COUNT;
+use hallstage_solver::estimator::whiten::Noise;
 use proptest::prelude::*;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -20,6 +27,7 @@ fn blob(day: f64, gain: f64, serial: &str) -> Blob {
     set.created = date.to_string().as_str().try_into().expect("short");
     set.serial = serial.try_into().expect("short");
     set.fit.rms = [0.5e-6; 3];
+    set.logs_sha256[..8].copy_from_slice(&day.to_le_bytes());
     (format!("day {day}"), set, None)
 }
 
@@ -55,8 +63,9 @@ fn an_even_drift_reaches_the_limit_on_its_day() {
     assert_eq!(last.day, 90.0);
     assert!((f64::from((date - last.date.date()).get_days()) - day).abs() <= 1.0);
     // Errors beyond the limit need no drift.
-    let beyond = super::drift([0.0; 2], 2, 1e-6, Some(0.9e-6));
-    assert_eq!(beyond.days, [Some(0.0); 3]);
+    let days = [0.0, 1.0, 2.0, 3.0];
+    let beyond = super::drift(&DMatrix::zeros(4, 4), &days, (1e-6, Some(0.9e-6)));
+    assert_eq!(beyond.map(|of| of.days), Some([Some(0.0); 3]));
     // No limit, no date.
     assert_eq!(found.drifts[1].days, [None; 3]);
 }
@@ -76,11 +85,183 @@ fn no_trend_of_other_stages_of_one_time_or_without_a_date() {
     let (first, later) = (blob(0.0, 1.0, "S"), blob(9.0, 1.0, "S"));
     let other = new(vec![first.clone(), blob(9.0, 1.0, "T")]);
     assert!(matches!(other, TrendError::OtherStage { serial, .. } if serial == "T"));
-    assert_eq!(new(vec![first.clone(), first.clone()]), TrendError::NoLine);
+    let twice = new(vec![first.clone(), later.clone(), first.clone()]);
+    assert!(matches!(twice, TrendError::SameLog { name, other } if name == other));
+    let mut other_log = first.clone();
+    other_log.1.logs_sha256[9] ^= 1;
+    assert_eq!(new(vec![first.clone(), other_log]), TrendError::NoLine);
     let mut undated = later;
     undated.1.created = "yesterday".try_into().expect("short");
     let undated = new(vec![first, undated]);
     assert!(matches!(undated, TrendError::NoDate { created, .. } if created == "yesterday"));
+}
+
+#[test]
+fn a_time_with_a_zone_is_an_instant() {
+    let day = |created: &str| date(created).map(|date| date.date().to_string());
+    assert_eq!(
+        day("2026-01-01T01:00:00+02:00").as_deref(),
+        Some("2025-12-31")
+    );
+    assert_eq!(day("2026-01-01T23:00:00").as_deref(), Some("2026-01-01"));
+    assert_eq!(day("today"), None);
+}
+
+/// A blob with its posterior: a budget from a fit, and errors of the gains, of B twice and of C three times as large.
+fn known(mut blob: Blob, gain_error: f64) -> Blob {
+    let stage = shipped::stage();
+    let parameters = FieldParameters::from_set(&blob.1, &stage).expect("of the field model");
+    let noise = Noise {
+        white_m: [0.5e-6; 3],
+        drift: [0.0; 3],
+    };
+    let eta = Parameters::from_set(&blob.1).eta();
+    let mut covariance = DMatrix::identity(COUNT, COUNT) * 1e-24;
+    for (probe, eta) in eta.into_iter().enumerate() {
+        let row = probe * PER_PROBE + ETA;
+        covariance[(row, row)] = (gain_error * (1 + probe) as f64 * eta).powi(2);
+    }
+    let posterior = Posterior::from_covariance(covariance.clone(), &parameters, &noise);
+    let service = declared_service(&stage, &parameters, noise.white_m).expect("a service");
+    let predicted = Predicted::new(&service, &covariance, &[0.0; COUNT]);
+    let temperature = blob.1.constants.temperature.rounded();
+    let of = (&parameters, &posterior);
+    blob.2 = Some(StoredPosterior {
+        covariance,
+        noise,
+        misfit: 1.0,
+        repaired: Vec::new(),
+        budget: Budget::new(&stage, of, &temperature, &predicted, 100),
+        up_to: None,
+        marks: Vec::new(),
+        certificate: String::new(),
+    });
+    blob
+}
+
+#[test]
+fn the_limit_is_the_smaller_of_the_certificates_less_its_guard_band_and_of_the_noise() {
+    let blobs = [0.0, 30.0].map(|day| known(blob(day, 1.0, "S"), 1e-4));
+    let mut stage = shipped::stage();
+    let limit = |stage: &Stage| {
+        let trend = Trend::new(&blobs, stage).expect("a trend");
+        trend.drifts[0].limit.expect("a limit")
+    };
+    let budget = blobs[1].2.as_ref().and_then(|known| known.budget.as_ref());
+    let of_noise = 1.30 * budget.expect("a budget").noise()[0];
+    assert!((limit(&stage) / of_noise - 1.0).abs() < 1e-9);
+    stage.certificate.limits = [Some(2.0 * of_noise); 3];
+    assert!((limit(&stage) / of_noise - 1.0).abs() < 1e-9);
+    stage.certificate.limits = [Some(0.9 * of_noise); 3];
+    assert!((limit(&stage) / of_noise - 0.9).abs() < 1e-9);
+    stage.certificate.is_guarded = true;
+    let budget = budget.expect("a budget");
+    let (predicted, declared) = (budget.predicted(), budget.declared()[0]);
+    let guard = predicted.range[0][1].hypot(1.96 * declared) - predicted.rms[0];
+    let guarded = 0.9 * of_noise - guard;
+    assert!(
+        (limit(&stage) / guarded - 1.0).abs() < 1e-9 && guard > 0.0,
+        "{guard}"
+    );
+}
+
+#[test]
+fn a_change_of_a_gain_has_the_errors_of_both_calibrations() {
+    let blobs = [
+        known(blob(0.0, 1.0, "S"), 3e-4),
+        known(blob(9.0, 0.99, "S"), 4e-4),
+    ];
+    let found = Trend::new(&blobs, &shipped::stage()).expect("a trend");
+    for probe in 0..3 {
+        assert_eq!(found.calibrations[0].gains[probe], (0.0, None));
+        let error = found.calibrations[1].gains[probe].1.expect("an error");
+        let both = 5e-4 * (1 + probe) as f64;
+        assert!((error / both - 1.0).abs() < 0.02, "{error} {both}");
+    }
+    // The last calibration without its posterior is named.
+    assert!(shown::warnings(&found).is_empty());
+    let [first, (name, set, _)] = blobs;
+    let found = Trend::new(&[first, (name, set, None)], &shipped::stage()).expect("a trend");
+    assert!(shown::warnings(&found)[0].starts_with("day 9, the last blob"));
+}
+
+#[test]
+fn a_jump_is_named_with_its_dates_and_has_no_line() {
+    let scatter = [0.0, 1e-6, -2e-6, 1e-6, -1e-6, 2e-6];
+    let jumped = |size: f64| {
+        let errors = (0..6).map(|k| scatter[k] + LOSS_PER_DAY * DAYS_APART * k as f64);
+        let errors: Vec<f64> = errors
+            .enumerate()
+            .map(|(k, of)| of - size * f64::from(k > 3))
+            .collect();
+        trend(&errors)
+    };
+    let found = jumped(2e-3);
+    let (first, size) = found.drifts[0].jump.expect("a jump");
+    let expected = 2e-3 * 0.5 * shipped::stage().motion.axes[0].service;
+    assert_eq!(first, 4);
+    assert!((size / expected - 1.0).abs() < 0.02, "{size} {expected}");
+    assert_eq!(found.drifts[0].days, [None; 3]);
+    let said = shown::answer(&found);
+    assert!(
+        said.starts_with("X jumped by 0.50 µm (rms) between 2026-04-01 and 2026-05-01"),
+        "{said}"
+    );
+    assert!(said.contains("a line does not describe this") && !said.contains("No limit"));
+    // Neither scatter alone nor an even drift is a jump.
+    assert_eq!(jumped(0.0).drifts[0].jump, None);
+    assert_eq!(trend(&[0.0; 6]).drifts[0].jump, None);
+}
+
+#[test]
+fn an_interval_without_an_end_is_said_in_words() {
+    let mut found = trend(&[0.0; 4]);
+    let said = |found: &Trend, days: [Option<f64>; 3]| {
+        let mut found = found.clone();
+        found.drifts[0].days = days;
+        let json = serde_json::to_string(&shown::figures(&found)).expect("JSON");
+        assert!(!json.contains("no date"), "{json}");
+        (shown::answer(&found), json)
+    };
+    let (answer, _) = said(&found, [Some(10.0), Some(5.0), Some(20.0)]);
+    assert!(
+        answer.ends_with("on 2026-04-11; between 2026-04-06 and 2026-04-21 (95 %)."),
+        "{answer}"
+    );
+    let (answer, _) = said(&found, [Some(10.0), Some(5.0), None]);
+    assert!(
+        answer.ends_with("on 2026-04-11; not before 2026-04-06, or never (95 %)."),
+        "{answer}"
+    );
+    let (answer, json) = said(&found, [None, Some(5.0), None]);
+    let words =
+        "may reach their limit of 1.00 µm from 2026-04-06 on (95 %); by the line they do not.";
+    assert!(answer.ends_with(words), "{answer}");
+    assert!(json.contains(r#""reached":null"#) && json.contains(r#""earliest":"2026-04-06""#));
+    // The page is not marked as good, and the errors end at their limit in the chart.
+    let page =
+        |found: &Trend| shown::page(found, Vec::new(), Provenance::default()).expect("a page");
+    found.drifts[0].days = [None, Some(5.0), None];
+    assert!(page(&found).contains("verdict limited"));
+    found.drifts[0].days = [None; 3];
+    assert!(page(&found).contains("verdict good"));
+}
+
+#[test]
+fn the_curve_of_the_errors_grows_with_the_drift_to_the_limit_and_beyond() {
+    let found = trend(&[0.0; 4]);
+    let day = found.drifts[0].days[0].expect("a date");
+    let curve = shown::forecast(&found, 0, 90.0 + day);
+    assert!(
+        curve[0].0 == 90.0 && (curve[0].1 - 0.5).abs() < 1e-6,
+        "{:?}",
+        curve[0]
+    );
+    let (last, error) = curve[curve.len() - 1];
+    assert!(
+        (last - 90.0 - day).abs() < 1e-9 && (error - 1.0).abs() < 1e-9,
+        "{last} {error}"
+    );
 }
 
 #[test]

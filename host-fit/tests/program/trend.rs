@@ -1,6 +1,6 @@
 //! The calibrations of a stage over time, on a stage made of physics whose gains fall evenly.
 
-use crate::common::{Bench, number, plan, says, stdout};
+use crate::common::{Bench, number, plan, says, stderr, stdout};
 use crate::recalibrate::with_gains;
 
 #[test]
@@ -38,6 +38,18 @@ fn calibrations_of_falling_gains_say_when_the_errors_reach_their_limit() {
         says(&page, part);
     }
     assert!(!page.contains("Nothing is wrong"));
+
+    // Without the posterior of the last blob, its errors are those on the log.
+    std::fs::rename(bench.path("2.bin.posterior"), bench.path("away")).expect("there");
+    let shown = bench.good("trend 0.bin 1.bin 2.bin --report page");
+    says(stderr(&shown), "2.bin, the last blob, has no posterior");
+    says(
+        bench.text("page/index.html"),
+        "2.bin, the last blob, has no posterior",
+    );
+    bench.good("fit log.csv --out twice.bin --serial HS-3 --created 2026-06-01");
+    let parts = ["twice.bin and 0.bin are calibrations by the same log"];
+    bench.bad("trend 0.bin 1.bin twice.bin", 3, &parts);
 
     bench.good("fit log.csv --out other.bin --serial HS-4 --created 2026-05-01");
     bench.bad(
