@@ -7,7 +7,7 @@ use super::field;
 use super::figure::{Figure, Group, Item, bare, figure, group};
 use super::motion::{probe_motion, valid_up_to};
 use super::parameters::{Parameter, coordinates, field_parameters, parameters, parameters_in};
-use super::trusted::{reference, trusted};
+use super::reference::reference;
 use hallstage_calibration::diagnose::Diagnosis;
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::{Fit, FitSettings};
@@ -101,7 +101,6 @@ impl Report {
     /// | `temperatures`, `logs` | the errors by degree of mount and body, and log by log |
     /// | `channels` | properties of each column of the logs |
     /// | `reference` | the calibrated point, and the places of the beams |
-    /// | `trusted_inputs` | the inputs with errors that no log shows, an error of each, and its cost |
     pub fn from_judgement(judged: Judged) -> Self {
         let Judged {
             set,
@@ -139,13 +138,12 @@ impl Report {
             "predicted" => json!(diagnosis.predicted),
             "budget" => diagnosis.budget.as_ref().map(budget::figures),
             "valid_within_k" => json!(diagnosis.validity.map(|validity| validity.within_k)),
-            "valid_up_to" => json!(diagnosis.motion.map(valid_up_to)),
+            "valid_up_to" => json!(diagnosis.up_to.map(valid_up_to)),
             "temperatures" => several(errors_per_degree(dataset, &judged.by_row)),
             "findings" => json!(words::worded(findings)),
             "channels" => channels(&diagnosis.columns, dataset),
             "logs" => several(errors_per_log(dataset, judgement)),
             "reference" => reference(judged.stage),
-            "trusted_inputs" => trusted(set, judged.stage),
             "refusal" => json!(refusal),
             // Programs may look these up in any report.
             "model_reason" => Figure::None,
