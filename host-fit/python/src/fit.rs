@@ -132,7 +132,7 @@ fn read_limits(given: &Bound<'_, PyAny>) -> PyResult<Option<ErrorLimits>> {
     for (name, limit) in by_axis {
         let axis = PLANAR.iter().position(|axis| axis.key == name);
         let axis = axis.filter(|_| limit.is_finite() && limit > 0.0);
-        limits.accepted[axis.ok_or_else(|| wrong("limit", problem))?] = Some(limit);
+        limits.0[axis.ok_or_else(|| wrong("limit", problem))?] = Some(limit);
     }
     Ok(Some(limits))
 }
