@@ -1,4 +1,4 @@
-"""The rate of decoding arrays on one core, and the time of a fit by the package and by the program.
+"""The rate of decoding arrays and of their uncertainties on one core, and the time of a fit by the package and by the program.
 
     python host-fit/python/benches/package.py [target/release/host-fit]
 
@@ -51,6 +51,8 @@ def main() -> None:
         dec = hs.fit(hs.Log.load(run30, stage), model=model).decoder()
         rate = len(hall) * 1e-6 / seconds(partial(dec, hall=hall, caps=caps))
         print(f"RESULT decode_{model}_million_ticks_per_s={rate:.1f}", flush=True)
+    rate = len(hall) * 1e-6 / seconds(partial(dec.uncertainty, hall=hall, caps=caps), 3)
+    print(f"RESULT uncertainty_field_million_rows_per_s={rate:.2f}", flush=True)
 
     program = sys.argv[1] if len(sys.argv) > 1 else str(Path(sys.executable).parent / "host-fit")
     command: list[str | Path] = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]

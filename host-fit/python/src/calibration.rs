@@ -4,10 +4,10 @@ use crate::decoder::{self, Decoder};
 use crate::error::{internal, output_error, wrong};
 use crate::log::Log;
 use crate::origin::{OfFit, Origin};
+use crate::pickle::restored;
 use crate::report::text;
 use crate::stage::Stage;
 use crate::statistics::Statistics;
-use crate::work::restored;
 use host_fit::calibrate::{JudgedFit, other_scales};
 use host_fit::calibration::recalibrate::StoredPosterior;
 use host_fit::input::log::LogReading;
@@ -160,14 +160,6 @@ impl Calibration {
             Some(subject) => format!("{title}\n{}", text(&subject)),
             None => format!("<{title}>"),
         }
-    }
-
-    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        slf
-    }
-
-    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
-        slf
     }
 
     /// What the files of a calibration hold.

@@ -4,6 +4,7 @@ use crate::calibration::{files, from_files};
 use crate::error::{blob_error, log_error, posterior_error, wrong};
 use crate::log::Log;
 use crate::motion::Commanded;
+use crate::pickle::restored;
 use crate::rows::Given;
 use crate::work;
 use host_fit::calibration::recalibrate::StoredPosterior;
@@ -156,17 +157,9 @@ impl Decoder {
         &self.set.created
     }
 
-    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        slf
-    }
-
-    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
-        slf
-    }
-
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let (blob, posterior) = files(py, &self.set, self.known.as_ref())?;
-        work::restored(py, (py.get_type::<Self>(), blob, posterior))
+        restored(py, (py.get_type::<Self>(), blob, posterior))
     }
 
     #[staticmethod]

@@ -19,6 +19,7 @@ mod log;
 mod minimize;
 mod motion;
 mod origin;
+mod pickle;
 mod plan;
 mod program;
 mod report;

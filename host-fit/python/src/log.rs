@@ -2,6 +2,7 @@
 
 use crate::error::{arrays_error, log_error, output_error, wrong};
 use crate::held::HeldRows;
+use crate::pickle::restored;
 use crate::source::{Logs, Source, is_own};
 use crate::stage::Stage;
 use crate::table::csv;
@@ -160,14 +161,6 @@ impl Log {
         format!("<Log {names}: {rows} rows in {movements}{held}>")
     }
 
-    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        slf
-    }
-
-    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
-        slf
-    }
-
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let LogText { source, how, .. } = &self.text;
         let texts = source.texts()?.into_iter();
@@ -184,7 +177,7 @@ impl Log {
             bad_rows,
             rows,
         );
-        work::restored(py, arguments)
+        restored(py, arguments)
     }
 
     #[staticmethod]

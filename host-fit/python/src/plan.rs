@@ -5,6 +5,7 @@ use crate::choice::chosen;
 use crate::error::{internal, log_error, output_error, wrong};
 use crate::log::Log;
 use crate::minimize::whole;
+use crate::pickle::restored;
 use crate::source::Source;
 use crate::stage::Stage;
 use crate::text::How;
@@ -145,7 +146,7 @@ impl SimulatedLog {
     fn __reduce__<'py>(slf: PyRef<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
         let log = Bound::new(py, slf.as_super().clone_ref(py))?;
-        work::restored(py, (py.get_type::<Self>(), log, slf.truth.clone_ref(py)))
+        restored(py, (py.get_type::<Self>(), log, slf.truth.clone_ref(py)))
     }
 
     #[staticmethod]

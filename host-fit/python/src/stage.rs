@@ -1,7 +1,7 @@
 //! The stage as designed.
 
 use crate::error::{stage_error, wrong};
-use crate::work::restored;
+use crate::pickle::restored;
 use host_fit::input::stage::Stage as Designed;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBool, PyDict, PyTuple};
@@ -72,14 +72,6 @@ impl Stage {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         restored(py, (py.get_type::<Self>(), &self.text, &self.path))
-    }
-
-    const fn __copy__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        slf
-    }
-
-    const fn __deepcopy__<'a>(slf: PyRef<'a, Self>, _memo: &Bound<'_, PyAny>) -> PyRef<'a, Self> {
-        slf
     }
 
     /// Reads a `stage.toml`.

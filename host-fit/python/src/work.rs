@@ -3,7 +3,6 @@
 use crate::error::internal;
 use host_fit::input::watch::Watch;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -79,13 +78,4 @@ fn show(py: Python<'_>) -> PyResult<()> {
     let module = py.import("hallstage._progress")?;
     module.call_method1("show", (what, done, total))?;
     Ok(())
-}
-
-/// What `__reduce__` gives: a class makes the object again by its `_restore`, from these arguments after the class.
-pub fn restored<'py>(
-    py: Python<'py>,
-    arguments: impl IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>,
-) -> PyResult<Bound<'py, PyTuple>> {
-    let restored = py.import("hallstage._results")?.getattr("restored")?;
-    (restored, arguments).into_pyobject(py)
 }
