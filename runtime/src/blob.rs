@@ -43,7 +43,7 @@
 use crate::layout;
 use crate::model::Probes;
 use crate::parameters::{ParameterError, ParameterSet};
-use crc::{CRC_32_ISCSI, Crc, NoTable};
+use crc::{CRC_32_ISCSI, Crc};
 
 /// First bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"HALL";
@@ -59,8 +59,8 @@ pub const CRC_BYTES: usize = 4;
 /// The largest blob. Of versions 1 to 3 it is 656.
 pub const MAX_BYTES: usize = 764;
 
-/// CRC-32C without a table: a blob is read once, at start, and flash is short.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
+/// CRC-32C of a blob.
+pub static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// Why bytes are not a usable blob.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

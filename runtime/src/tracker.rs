@@ -117,6 +117,11 @@ impl<D: Decode> PoseTracker<D> {
         }
     }
 
+    /// The decoder.
+    pub const fn decoder(&self) -> &D {
+        &self.decoder
+    }
+
     /// One servo period: decodes the frame, subtracts the zero deviation, holds or zeroes
     /// what is invalid, counts, and feeds a re-zero in progress.
     ///

@@ -10,8 +10,7 @@
 //! | [`random`] | random numbers that depend on a seed alone |
 //! | [`node`] | a node that takes new parameters over the bus |
 
-use hal_adapters::can::update::NotWritten;
-use stage_node::store::{Flash, SLOT_BYTES};
+use stage_node::store::Slots;
 use std::error::Error;
 use std::process::ExitCode;
 

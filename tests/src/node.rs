@@ -1,129 +1,120 @@
-//! The stage controller on this machine: the firmware's own start, node, records and outbox, over
-//! two sectors of flash in RAM. The clock is advanced by the caller, the codes are made up, and the random numbers
-//! follow from a seed.
+//! The stage controller on this machine: the code of every chip over two sectors of flash in RAM. The clock is advanced by
+//! the caller, the codes are made up, and the random numbers follow from a seed.
 
-use crate::flash_model::FlashModel;
+use crate::flash_model::{FlashModel, slots};
 use crate::random::Random;
-use hal_adapters::can::update::{Identity, Key, Store as _};
-use hal_adapters::can::{BusFrame, Coded, Layout};
-use runtime::RawFrame;
-use stage_node::node::{Facts, Node as Ticking, Parameters};
-use stage_node::outbox::Outbox;
-use stage_node::records::{Choice, Loaded, Records};
-use stage_node::retained::{Retained, WORDS};
-use stage_node::schedule::PERIOD_US;
-use stage_node::start_up::{Before, Cause, PROVEN_TICKS};
-use stage_node::store::Image;
-use std::ptr::NonNull;
+use embedded_hal::spi::{MODE_0, Mode};
+use hal_adapters::adc::{AdcError, FrameSampler};
+use hal_adapters::can::status::BoardFacts;
+use hal_adapters::can::update::{Identity, Key, Nonce, Store as _};
+use hal_adapters::can::{BusFrame, Coded};
+use runtime::zero_offset::ZeroOffsetSettings;
+use runtime::{PlanarPose, RawFrame};
+use stage_node::board::Board;
+use stage_node::bus::{Can, CanState, Mailboxes};
+use stage_node::controller::{Controller, Parts, Settings};
+use stage_node::records::{Choice, Records};
+use stage_node::retained::RetainedRam;
+use stage_node::schedule::Period;
+use stage_node::start_up::{Before, Cause};
+use std::collections::VecDeque;
+use std::convert::Infallible;
 
 /// Frames that a tick takes from the bus at most.
 pub const TAKEN_PER_TICK: usize = 3;
+/// The servo period, us.
+const PERIOD_US: u32 = 2000;
 
 /// A controller.
 pub struct Node {
-    serial: Option<&'static str>,
-    key: Option<Key>,
-    ticking: Ticking<'static>,
-    records: Records<FlashModel>,
-    // Below what borrows from it: fields are dropped in this order.
-    statics: Statics,
-    /// RAM that survives a reset.
-    retained: [u32; WORDS],
-    outbox: Outbox,
-    random: Random,
+    settings: Settings<'static>,
+    controller: Controller<'static, Converter, Wire, FlashModel, Host>,
     resets: u32,
 }
 
 impl Node {
     /// A controller of the stage `serial`, if its program knows that, with this flash, after
     /// power-on.
+    ///
+    /// # Panics
+    /// Never.
     pub fn new(
         serial: Option<&'static str>,
         key: Option<Key>,
         flash: FlashModel,
         seed: u64,
     ) -> Self {
-        let before = Before::new(Cause::PowerOn, None);
-        let (ticking, records, statics) = start(flash, (serial, key), &before);
-        let retained = retained(&before, &records, &ticking);
-        Self {
-            serial,
-            key,
-            ticking,
-            records,
-            statics,
-            retained,
-            outbox: Outbox::new(),
+        let settings = Settings {
+            identity: Identity {
+                serial,
+                key,
+                program_version: 0x00_01_02_03,
+            },
+            period: Period::from_us(PERIOD_US).expect("a period"),
+            rezero_limits: ZeroOffsetSettings::default(),
+        };
+        let host = Host {
+            now_us: 0,
+            erases: false,
+            is_to_be_reset: false,
             random: Random::new(seed),
+            record: RetainedRam::new(),
+        };
+        Self {
+            settings,
+            controller: start(&settings, flash, host, Cause::PowerOn),
             resets: 0,
         }
     }
 
-    /// One tick after `missed_ticks` missed ticks: decodes codes, takes frames of the bus, and stores an update.
+    /// When the next tick is due, us.
+    pub const fn due_us(&self) -> u32 {
+        self.controller.due_us()
+    }
+
+    /// One tick, so much late: decodes codes, takes frames of the bus, and stores an update.
     /// Returns whether it stored one, which takes half a second.
-    pub fn tick(
-        &mut self,
-        missed_ticks: u32,
-        received: impl IntoIterator<Item = BusFrame>,
-    ) -> bool {
-        self.outbox.start_tick();
-        let stores = self.ticking.is_storing() && self.outbox.is_empty();
-        let sample = Ok(codes(self.ticking.ticks()));
-        let facts = Facts {
-            missed_ticks,
-            servo_off_pin: Some(true),
-            ..Facts::default()
-        };
-        (self.ticking).tick(sample, &facts, &mut self.outbox);
-        for frame in received.into_iter().take(TAKEN_PER_TICK) {
-            let nonce = [(); 4].map(|()| self.random.bits() as u32);
-            (self.ticking).take(&frame, &mut self.outbox, &mut self.records, Some(nonce));
-        }
-        if self.ticking.ticks() == PROVEN_TICKS {
-            let mut record = Retained::from_words(&self.retained).unwrap_or_default();
-            record.prove();
-            self.retained = record.to_words();
-        }
-        if stores {
-            (self.ticking).store(&mut self.outbox, &mut self.records);
-        }
-        stores
+    pub fn tick(&mut self, late_us: u32, received: impl IntoIterator<Item = BusFrame>) -> bool {
+        self.controller.can().received.extend(received);
+        let now_us = self.controller.due_us().wrapping_add(late_us);
+        self.controller.board.now_us = now_us;
+        self.controller.trigger();
+        self.controller.finish();
+        core::mem::take(&mut self.controller.board.erases)
     }
 
     /// Whether a zero deviation is subtracted.
     pub fn is_zeroed(&self) -> bool {
-        self.ticking.zero() != runtime::PlanarPose::ZERO
+        self.controller.node().zero() != PlanarPose::ZERO
     }
 
     /// The next frame for the bus.
     pub fn send(&mut self) -> Option<Coded> {
-        self.outbox.pop()
+        let wire = self.controller.can();
+        let frame = wire.mailbox.take()?;
+        wire.sent += 1;
+        self.controller.mailbox_empty();
+        Some(frame)
     }
 
-    /// Whether it waits for a reset, and its answers have left.
-    pub fn is_to_be_reset(&self) -> bool {
-        self.ticking.wants_reset() && self.outbox.is_empty()
+    /// Whether it waits for the reset that it asked for.
+    pub const fn is_to_be_reset(&self) -> bool {
+        self.controller.board.is_to_be_reset
     }
 
-    /// A reset: flash and retained RAM are kept.
-    pub fn reset(&mut self) {
-        if self.ticking.wants_reset() {
-            let mut record = Retained::from_words(&self.retained).unwrap_or_default();
-            record.activate();
-            self.retained = record.to_words();
-        }
-        self.start(Cause::Reset);
-    }
-
-    fn start(&mut self, cause: Cause) {
-        let before = Before::new(cause, Retained::from_words(&self.retained));
-        let mut flash = self.flash().clone();
+    /// A reset that takes so long: flash and retained RAM are kept.
+    pub fn reset(&mut self, us: u32) {
+        let board = &mut self.controller.board;
+        let host = Host {
+            now_us: board.now_us.wrapping_add(us),
+            erases: false,
+            is_to_be_reset: false,
+            random: board.random.clone(),
+            record: core::mem::take(&mut board.record),
+        };
+        let mut flash = self.flash();
         flash.power_on();
-        let statics;
-        (self.ticking, self.records, statics) = start(flash, (self.serial, self.key), &before);
-        self.statics = statics;
-        self.retained = retained(&before, &self.records, &self.ticking);
-        self.outbox = Outbox::new();
+        self.controller = start(&self.settings, flash, host, Cause::Reset);
         self.resets += 1;
     }
 
@@ -132,18 +123,18 @@ impl Node {
         self.resets
     }
 
-    /// Its flash.
-    pub const fn flash(&self) -> &FlashModel {
-        self.records.flash()
+    /// A copy of its flash.
+    fn flash(&mut self) -> FlashModel {
+        self.controller.records().slots().flash.clone()
     }
 
     /// The blob that the next power-on would run.
-    pub fn newest(&self) -> Option<Vec<u8>> {
-        let mut flash = self.flash().clone();
-        let (records, _) = Records::start(&mut flash, Choice::Newest, self.serial);
+    pub fn newest(&mut self) -> Option<Vec<u8>> {
+        let serial = self.settings.identity.serial;
+        let (mut records, _) = Records::start(slots(self.flash()), Choice::Newest, serial);
         let newest = records.newest()?;
         [0, 1].into_iter().find_map(|slot| {
-            let image = Image::read(records.flash(), slot);
+            let image = records.slots().image(slot);
             let stored = image.stored(slot)?;
             let is_newest = (stored.sequence, stored.crc) == (newest.sequence, newest.crc);
             is_newest.then(|| image.blob()[..stored.bytes as usize].to_vec())
@@ -151,68 +142,136 @@ impl Node {
     }
 
     /// The highest sequence number; 0 for a plain blob.
-    pub fn records(&self) -> u32 {
-        self.records.newest_sequence()
+    pub fn records(&mut self) -> u32 {
+        self.controller.records().newest_sequence()
     }
 }
 
-/// The statics of the controller, for one start.
-struct Statics {
-    place: NonNull<Option<Loaded>>,
-}
-
-impl Drop for Statics {
-    fn drop(&mut self) {
-        // SAFETY: it is a box of `start`, which gave its only reference to the node and the records. `Node` drops or
-        // replaces both first, and hands out neither.
-        drop(unsafe { Box::from_raw(self.place.as_ptr()) });
-    }
-}
-
-/// The firmware's `init` without the chip.
 fn start(
+    settings: &Settings<'static>,
     flash: FlashModel,
-    (serial, key): (Option<&'static str>, Option<Key>),
-    before: &Before,
-) -> (Ticking<'static>, Records<FlashModel>, Statics) {
-    let place = Box::leak(Box::new(None));
-    let statics = Statics {
-        place: NonNull::from(&mut *place),
+    board: Host,
+    cause: Cause,
+) -> Controller<'static, Converter, Wire, FlashModel, Host> {
+    let before = Before::of_ram(cause, &board.record);
+    let parts = Parts {
+        converter: Converter,
+        can: Wire::default(),
+        slots: slots(flash),
+        board,
     };
-    let (mut records, refusal) = Records::start(flash, before.choice, serial);
-    let is_sound = runtime::arithmetic::check().is_ok();
-    let loaded = match is_sound {
-        true => records.load(before.choice, place),
-        false => None,
-    };
-    let stop = before.stop(loaded.is_some());
-    let parameters = Parameters::at_start(loaded, refusal, stop, is_sound);
-    let identity = Identity {
-        serial,
-        key,
-        program_version: 0x00_01_02_03,
-    };
-    let mut node = Ticking::new(parameters, before.by_fault, Layout::Bits24, identity);
-    before.restore_zero(&mut node, loaded.map_or(0, |loaded| loaded.crc));
-    (node, records, statics)
+    Controller::start(parts, *settings, &before, BoardFacts::default())
 }
 
-/// RAM that survives a reset, once the node runs.
-fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_>) -> [u32; WORDS] {
-    let mut record = before.record;
-    if let Some(running) = records.running() {
-        record.runs(running.id.crc, ticking.zero());
+/// The board: a clock of the caller, and random numbers by a seed. The servo is off.
+struct Host {
+    now_us: u32,
+    /// A sector was erased.
+    erases: bool,
+    is_to_be_reset: bool,
+    random: Random,
+    /// RAM that survives a reset.
+    record: RetainedRam,
+}
+
+impl Board for Host {
+    fn now_us(&mut self) -> u32 {
+        self.now_us
     }
-    record.to_words()
+
+    fn feed_watchdog(&mut self) {}
+
+    fn expect_erase(&mut self, is_next: bool) {
+        self.erases |= is_next;
+    }
+
+    fn light(&mut self, _: bool) {}
+
+    fn servo_is_off(&mut self) -> Option<bool> {
+        Some(true)
+    }
+
+    fn nonce(&mut self) -> Option<Nonce> {
+        Some([(); 4].map(|()| self.random.bits() as u32))
+    }
+
+    fn record(&self) -> &RetainedRam {
+        &self.record
+    }
+
+    fn reset(&mut self) {
+        self.is_to_be_reset = true;
+    }
+}
+
+/// A CAN controller with one mailbox.
+#[derive(Default)]
+struct Wire {
+    mailbox: Option<Coded>,
+    /// Frames sent and given up since they were last asked for.
+    sent: u32,
+    given_up: u32,
+    received: VecDeque<BusFrame>,
+}
+
+impl Can for Wire {
+    fn take_back(&mut self) {
+        self.given_up += u32::from(self.mailbox.take().is_some());
+    }
+
+    fn mailboxes(&mut self) -> Mailboxes {
+        Mailboxes {
+            sent: core::mem::take(&mut self.sent),
+            given_up: core::mem::take(&mut self.given_up),
+            are_empty: self.mailbox.is_none(),
+        }
+    }
+
+    fn put(&mut self, frame: &Coded) -> bool {
+        let is_empty = self.mailbox.is_none();
+        self.mailbox.get_or_insert(*frame);
+        is_empty
+    }
+
+    fn receive(&mut self) -> Option<BusFrame> {
+        self.received.pop_front()
+    }
+
+    fn state(&mut self) -> CanState {
+        CanState {
+            takes_part: true,
+            ..CanState::default()
+        }
+    }
 }
 
 /// Codes of a stage at rest; no two ticks in a row have the same.
-fn codes(tick: u32) -> RawFrame {
-    let change = (tick % 10) as i32;
-    RawFrame::new(
-        [100 + change, 200 - change, change],
-        [change, -change, 10 + change],
-        tick,
-        tick.wrapping_mul(PERIOD_US),
-    )
+struct Converter;
+
+impl FrameSampler for Converter {
+    type Bus = Infallible;
+    const SPI_MODE: Mode = MODE_0;
+    const SPI_HZ_MAX: u32 = 1;
+    const SETTLE_US: u32 = 0;
+    const CODE_BITS: u32 = 24;
+
+    fn start(&mut self) -> Result<(), AdcError<Infallible>> {
+        Ok(())
+    }
+
+    fn trigger(&mut self) -> Result<(), AdcError<Infallible>> {
+        Ok(())
+    }
+
+    fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<Infallible>> {
+        let change = (sequence % 10) as i32;
+        let hall = [100 + change, 200 - change, change];
+        let time_us = sequence.wrapping_mul(PERIOD_US);
+        Ok(RawFrame::new(
+            hall,
+            [change, -change, 10 + change],
+            sequence,
+            time_us,
+        ))
+    }
 }

@@ -1,13 +1,13 @@
 //! A converter: read in every tick, and started again after faults.
 
-use crate::schedule::PERIOD_US;
+use crate::schedule::Period;
 use hal_adapters::adc::stuck::StuckWatch;
 use hal_adapters::adc::{AdcError, FrameSampler};
 use runtime::RawFrame;
 
-/// Ticks in a row without codes after which the converter is started again: 32 ms. A start
+/// Time without codes after which the converter is started again, ms. A start
 /// takes up to 210 bytes of SPI and the measurement of a period, about 0.7 ms.
-pub const RESTART_TICKS: u16 = (32_000 / PERIOD_US) as u16;
+pub const RESTART_MS: u32 = 32;
 
 /// A converter and its recent faults.
 #[derive(Debug)]
@@ -16,18 +16,20 @@ pub struct Acquisition<A: FrameSampler> {
     watch: StuckWatch,
     /// The fault of a trigger: the sample that follows reports it.
     trigger_fault: Option<AdcError<A::Bus>>,
-    faults_in_a_row: u16,
+    restart_ticks: u32,
+    faults_in_a_row: u32,
     faults: u32,
     starts: u32,
 }
 
 impl<A: FrameSampler> Acquisition<A> {
     /// A converter that is not started yet: see [`Self::start`].
-    pub const fn new(converter: A) -> Self {
+    pub fn new(converter: A, period: Period) -> Self {
         Self {
             converter,
             watch: StuckWatch::new(A::CODE_BITS),
             trigger_fault: None,
+            restart_ticks: period.ticks_in_ms(RESTART_MS),
             faults_in_a_row: 0,
             faults: 0,
             starts: 0,
@@ -37,7 +39,7 @@ impl<A: FrameSampler> Acquisition<A> {
     /// Resets the converter and sets it up.
     ///
     /// # Errors
-    /// See [`AdcError`]. Ticks go on, and the converter is started again after [`RESTART_TICKS`].
+    /// See [`AdcError`]. Ticks go on, and the converter is started again after [`RESTART_MS`].
     pub fn start(&mut self) -> Result<(), AdcError<A::Bus>> {
         self.starts = self.starts.saturating_add(1);
         self.faults_in_a_row = 0;
@@ -52,7 +54,7 @@ impl<A: FrameSampler> Acquisition<A> {
     /// The codes of a tick.
     ///
     /// # Errors
-    /// See [`AdcError`]. After [`RESTART_TICKS`] such ticks in a row, or one with a setting that
+    /// See [`AdcError`]. After [`RESTART_MS`] of such ticks, or one with a setting that
     /// was lost, the converter is started again instead of being read, and can give codes from the
     /// next tick on.
     pub fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<A::Bus>> {
@@ -80,7 +82,7 @@ impl<A: FrameSampler> Acquisition<A> {
         if let Some(fault) = self.trigger_fault.take() {
             return Err(fault);
         }
-        if self.faults_in_a_row >= RESTART_TICKS {
+        if self.faults_in_a_row >= self.restart_ticks {
             self.start()?;
             let (ready, read) = (0, 0);
             return Err(AdcError::NotReady { ready, read });
@@ -88,7 +90,7 @@ impl<A: FrameSampler> Acquisition<A> {
         let sampled = self.converter.sample(sequence);
         // The next samples would be wrong, and a part can report it only once.
         if let Err(AdcError::WrongSetting { .. }) = sampled {
-            self.faults_in_a_row = RESTART_TICKS;
+            self.faults_in_a_row = self.restart_ticks;
         }
         self.watch.pass(sampled?)
     }

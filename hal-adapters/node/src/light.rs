@@ -11,18 +11,25 @@
 //! | blinking fast, on as long as off | asked to show where it is |
 //! | off | no power, or between reset and the first tick |
 
-use crate::schedule::TICKS_PER_S;
+use crate::schedule::Period;
 use hal_adapters::can::status::{NodeState, board_check};
 
-/// Ticks of a flash, and of the pause after it: 0.1 s.
-const FLASH: u32 = TICKS_PER_S / 10;
-/// Ticks of half a period while identifying: 62 ms.
-const FAST: u32 = TICKS_PER_S / 16;
+/// Time of a flash, and of the pause after it, ms.
+const FLASH_MS: u32 = 100;
+/// Half a period while identifying, ms.
+const FAST_MS: u32 = 62;
 
 /// Whether the LED is on in this tick. `board_checks` are the bits of [`board_check`].
-pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick: u32) -> bool {
+pub fn is_on(
+    state: NodeState,
+    board_checks: u32,
+    identifying: bool,
+    tick: u32,
+    period: Period,
+) -> bool {
+    let ms = period.ms_in_second(tick);
     if identifying {
-        return (tick / FAST).is_multiple_of(2);
+        return (ms / FAST_MS).is_multiple_of(2);
     }
     let flashes = match state {
         NodeState::Starting => return false,
@@ -36,7 +43,7 @@ pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick:
         | NodeState::Stopped => 2,
         NodeState::Running => 1,
     };
-    let slot = (tick % TICKS_PER_S) / FLASH;
+    let slot = ms / FLASH_MS;
     slot.is_multiple_of(2) && slot / 2 < flashes
 }
 
@@ -47,8 +54,9 @@ mod tests {
     #[test]
     fn each_state_has_its_number_of_flashes() {
         let flashes = |state, checks, identifying| {
-            let on = |tick| is_on(state, checks, identifying, tick);
-            (1..=TICKS_PER_S)
+            let period = Period::from_us(2000).expect("a period");
+            let on = |tick| is_on(state, checks, identifying, tick, period);
+            (1..=period.ticks_per_s())
                 .filter(|&tick| on(tick) && !on(tick - 1))
                 .count()
         };

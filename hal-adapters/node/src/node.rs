@@ -6,7 +6,7 @@ pub use state::{Parameters, SampleFault};
 
 use crate::fpu;
 use crate::outbox::Outbox;
-use crate::schedule::TICKS_PER_S;
+use crate::schedule::Period;
 use embedded_can::Frame;
 use hal_adapters::can::command::Content;
 use hal_adapters::can::sensor::{self, TemperatureSender};
@@ -53,15 +53,16 @@ impl Facts {
 
 /// The stage controller, apart from its chip.
 #[derive(Clone, Debug)]
-pub struct Node<'d> {
-    parameters: Parameters<'d>,
+pub struct Node<'s> {
+    parameters: Parameters,
+    period: Period,
     watchdog_reset: bool,
     /// How codes are put into frames.
     layout: Layout,
     sender: PoseSender,
     temperatures: TemperatureSender,
     service: Service,
-    receiver: Receiver<'d>,
+    receiver: Receiver<'s>,
     has_key: bool,
     ticks: u32,
     state: (NodeState, u8),
@@ -71,23 +72,25 @@ pub struct Node<'d> {
     bus_off_sent: u32,
 }
 
-impl<'d> Node<'d> {
+impl<'s> Node<'s> {
     /// A node before its first tick; `layout` holds the codes of its converter.
     pub fn new(
-        parameters: Parameters<'d>,
+        parameters: Parameters,
         watchdog_reset: bool,
         layout: Layout,
-        identity: Identity<'d>,
+        identity: Identity<'s>,
+        period: Period,
     ) -> Self {
         Self {
             parameters,
+            period,
             watchdog_reset,
             layout,
             sender: PoseSender::default(),
             temperatures: TemperatureSender::START,
-            service: Service::new(TICKS_PER_S),
+            service: Service::new(period.ticks_per_s()),
             has_key: identity.key.is_some(),
-            receiver: Receiver::new(identity, TICKS_PER_S),
+            receiver: Receiver::new(identity, period.ticks_per_s()),
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
@@ -121,9 +124,12 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Whether there are parameters to decode with.
-    pub const fn decodes(&self) -> bool {
-        self.parameters.servo.is_some()
+    /// The decoder, if there are parameters to decode with.
+    pub const fn decoder(&self) -> Option<&AnyDecoder> {
+        match &self.parameters.servo {
+            Some(servo) => Some(servo.decoder()),
+            None => None,
+        }
     }
 
     /// State and reason after the last tick.
@@ -142,12 +148,13 @@ impl<'d> Node<'d> {
     }
 
     /// Whether the LED is to be on.
-    pub const fn light(&self) -> bool {
+    pub fn light(&self) -> bool {
         crate::light::is_on(
             self.state.0,
             self.board_checks,
             self.service.is_identifying(),
             self.ticks,
+            self.period,
         )
     }
 
@@ -165,7 +172,7 @@ impl<'d> Node<'d> {
         let is_updating = self.receiver.is_updating();
         self.state = self.parameters.state(is_updating, &sample, &reading);
         self.board_checks = facts.board.board_checks;
-        if self.decodes() {
+        if self.decoder().is_some() {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }
         if let Ok(frame) = &sample {
@@ -308,7 +315,7 @@ impl<'d> Node<'d> {
 /// The arithmetic of a tick, in a function of its own: the checks of the FPU's settings stay
 /// before and after it.
 #[inline(never)]
-fn run(servo: &mut PoseTracker<&AnyDecoder>, sample: &Result<RawFrame, SampleFault>) -> Reading {
+fn run(servo: &mut PoseTracker, sample: &Result<RawFrame, SampleFault>) -> Reading {
     match sample {
         Ok(frame) => servo.tick(frame),
         Err(_) => servo.tick_without_frame(),

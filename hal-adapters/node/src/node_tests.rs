@@ -4,19 +4,17 @@ extern crate std;
 
 use super::*;
 use crate::records::{Choice, Loaded, Records};
-use crate::store::flash_model::FlashModel;
+use crate::store::flash_model::{FlashModel, slots};
 use crate::store::tests::blob;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
-use std::boxed::Box;
 use std::vec::Vec;
 
-fn loaded() -> &'static Loaded {
+fn loaded() -> Loaded {
     let mut flash = FlashModel::erased();
     flash.load(0, &blob(0));
-    let (mut records, _) = Records::start(flash, Choice::Newest, None);
-    let place = Box::leak(Box::new(None));
-    records.load(Choice::Newest, place).expect("a sound slot")
+    let (mut records, _) = Records::start(slots(flash), Choice::Newest, None);
+    records.load(Choice::Newest).expect("a sound slot")
 }
 
 /// Sends a request. Returns the outcomes that the node answers.
@@ -24,7 +22,7 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Outcome> {
     let command = Content::Command(Command::new(request, token));
     let frame = BusFrame::from(Mailbox::default().send(&command).expect("a frame"));
     let mut outbox = Outbox::new();
-    let (mut records, _) = Records::start(FlashModel::erased(), Choice::Newest, None);
+    let (mut records, _) = Records::start(slots(FlashModel::erased()), Choice::Newest, None);
     node.take(&frame, &mut outbox, &mut records, None);
     let mut host = Mailbox::default();
     core::iter::from_fn(|| outbox.pop())
@@ -43,13 +41,14 @@ fn without_a_key_the_servo_counts_as_on_unless_the_line_says_off() {
         (Some(false), Outcome::ServoOn),
         (None, Outcome::ServoOn),
     ] {
+        let period = Period::from_us(2000).expect("a period");
         let parameters = Parameters::at_start(Some(loaded()), None, None, true);
         let identity = Identity {
             serial: None,
             key: None,
             program_version: 1,
         };
-        let mut node = Node::new(parameters, false, Layout::Bits24, identity);
+        let mut node = Node::new(parameters, false, Layout::Bits24, identity, period);
         let facts = Facts {
             servo_off_pin: line,
             ..Facts::default()

@@ -1,6 +1,7 @@
 //! The parameters in flash: the running blob, the reason why another is refused, and new blobs from the bus.
 
-use crate::store::{self, Contents, Flash, Image, SLOTS, Stored};
+use crate::store::{Contents, SLOTS, Slots, Stored};
+use embedded_storage::nor_flash::MultiwriteNorFlash;
 use hal_adapters::can::update::{BlobId, NotWritten, Running, Store, word_at};
 use runtime::blob::{BlobError, MAX_BYTES};
 use runtime::parameters::Text;
@@ -22,8 +23,6 @@ pub enum Choice {
 pub struct Loaded {
     /// The decoder.
     pub decoder: AnyDecoder,
-    /// Serial number of the stage.
-    pub serial: Text,
     /// CRC of the blob.
     pub crc: u32,
 }
@@ -31,22 +30,23 @@ pub struct Loaded {
 /// Both slots with their flash.
 #[derive(Debug)]
 pub struct Records<F> {
-    flash: F,
+    slots: Slots<F>,
     /// The blobs that may run.
     stored: [Option<Stored>; SLOTS],
     /// The highest sequence number of any blob.
     highest: u32,
-    running: Option<(Stored, &'static Loaded)>,
+    /// The blob that runs, and the serial number of its stage.
+    running: Option<(Stored, Text)>,
 }
 
-impl<F: Flash> Records<F> {
+impl<F: MultiwriteNorFlash> Records<F> {
     /// At start-up: settles interrupted operations and checks both slots. A blob of another stage than `serial` is
     /// refused. Also returns the reason of the first refused slot: its number in bits 4 to 6 and
     /// [`BlobError::number`] below.
-    pub fn start(mut flash: F, choice: Choice, serial: Option<&str>) -> (Self, Option<u8>) {
-        store::settle(&mut flash);
+    pub fn start(mut slots: Slots<F>, choice: Choice, serial: Option<&str>) -> (Self, Option<u8>) {
+        slots.settle();
         let mut records = Self {
-            flash,
+            slots,
             stored: [None; SLOTS],
             highest: 0,
             running: None,
@@ -71,7 +71,7 @@ impl<F: Flash> Records<F> {
         choice: Choice,
         serial: Option<&str>,
     ) -> Result<Option<Stored>, BlobError> {
-        let image = Image::read(&self.flash, slot);
+        let image = self.slots.image(slot);
         match image.contents() {
             Contents::Nothing => return Ok(None),
             Contents::Damaged => {
@@ -95,26 +95,20 @@ impl<F: Flash> Records<F> {
     }
 
     /// Loads the chosen blob, which runs from now on. `None` if it is not there.
-    pub fn load(
-        &mut self,
-        choice: Choice,
-        place: &'static mut Option<Loaded>,
-    ) -> Option<&'static Loaded> {
+    pub fn load(&mut self, choice: Choice) -> Option<Loaded> {
         let stored = match choice {
             Choice::Newest => self.latest(|_| true),
             Choice::Blob(crc) => self.latest(|stored| stored.crc == crc),
             Choice::Nothing => None,
         }?;
-        let image = Image::read(&self.flash, stored.slot);
+        let image = self.slots.image(stored.slot);
         let read = ParameterSet::from_flash(image.blob());
         let set = read.as_ref().ok()?;
-        let loaded: &'static Loaded = place.insert(Loaded {
+        self.running = Some((stored, set.serial.clone()));
+        Some(Loaded {
             decoder: set.decoder(),
-            serial: set.serial.clone(),
             crc: stored.crc,
-        });
-        self.running = Some((stored, loaded));
-        Some(loaded)
+        })
     }
 
     /// The selected blob with the highest sequence number; slot 0 comes first among equal numbers.
@@ -124,13 +118,13 @@ impl<F: Flash> Records<F> {
     }
 
     /// The flash.
-    pub const fn flash(&self) -> &F {
-        &self.flash
+    pub const fn slots(&mut self) -> &mut Slots<F> {
+        &mut self.slots
     }
 
     /// The slot that may be erased: the running blob stays, or the newest blob if none runs.
     fn spare(&self) -> u8 {
-        let running = self.running.map(|(stored, _)| stored);
+        let running = self.running.as_ref().map(|(stored, _)| *stored);
         let kept = running.or_else(|| self.latest(|_| true));
         kept.map_or(0, |kept| 1 - kept.slot)
     }
@@ -148,21 +142,21 @@ const fn id(stored: Stored) -> BlobId {
     BlobId { sequence, crc }
 }
 
-impl<F: Flash> Store for Records<F> {
+impl<F: MultiwriteNorFlash> Store for Records<F> {
     fn running(&self) -> Option<Running<'_>> {
-        let (stored, loaded) = self.running.as_ref()?;
+        let (stored, serial) = self.running.as_ref()?;
         Some(Running {
             id: id(*stored),
             bytes: stored.bytes,
-            serial: &loaded.serial,
+            serial,
         })
     }
 
     fn word(&mut self, index: usize) -> Option<u32> {
-        let (stored, loaded) = self.running?;
-        let image = Image::read(&self.flash, stored.slot);
+        let (stored, _) = self.running.as_ref()?;
+        let image = self.slots.image(stored.slot);
         // An update may have written another blob into its slot.
-        let is_there = image.stored(stored.slot)?.crc == loaded.crc;
+        let is_there = image.stored(stored.slot)?.crc == stored.crc;
         let blob = image.blob().get(..(stored.bytes as usize).min(MAX_BYTES))?;
         word_at(blob, index).filter(|_| is_there)
     }
@@ -177,9 +171,9 @@ impl<F: Flash> Store for Records<F> {
 
     fn write(&mut self, sequence: u32, blob: &[u8]) -> Result<(), NotWritten> {
         let slot = self.spare();
-        let written = store::write(&mut self.flash, slot, sequence, blob);
+        let written = self.slots.write(slot, sequence, blob);
         // After a failure the slot has the blob before it, or none.
-        let left = Image::read(&self.flash, slot).stored(slot);
+        let left = self.slots.image(slot).stored(slot);
         if let Some(to) = self.stored.get_mut(usize::from(slot)) {
             *to = written.ok().or(to.filter(|before| left == Some(*before)));
         }

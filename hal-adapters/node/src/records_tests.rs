@@ -1,14 +1,12 @@
 extern crate std;
 
 use super::*;
-use crate::store::flash_model::FlashModel;
+use crate::store::flash_model::{FlashModel, slots};
 use crate::store::tests::{SERIAL, blob, crc, update};
-use std::boxed::Box;
 
 fn runs(flash: &mut FlashModel, choice: Choice) -> Option<u32> {
-    let (mut records, _) = Records::start(flash, choice, SERIAL);
-    let place = Box::leak(Box::new(None));
-    records.load(choice, place).map(|loaded| loaded.crc)
+    let (mut records, _) = Records::start(slots(flash), choice, SERIAL);
+    records.load(choice).map(|loaded| loaded.crc)
 }
 
 #[test]
@@ -21,9 +19,8 @@ fn what_runs_stays_however_much_is_stored_before_an_activation() {
     for (sequence, number) in [(3, 3), (4, 4), (5, 1), (6, 5)] {
         // As after a reset: the newest blob waits.
         let choice = Choice::Blob(ran);
-        let (mut records, _) = Records::start(&mut flash, choice, SERIAL);
-        let place = Box::leak(Box::new(None));
-        assert!(records.load(choice, place).is_some());
+        let (mut records, _) = Records::start(slots(&mut flash), choice, SERIAL);
+        assert!(records.load(choice).is_some());
         assert_eq!(records.write(sequence, &blob(number)), Ok(()));
         assert!(records.word(0).is_some());
         assert_eq!(records.newest().map(|kept| kept.sequence), Some(sequence));

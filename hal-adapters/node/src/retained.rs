@@ -3,8 +3,9 @@
 //!
 //! After power-on the RAM holds noise and is not read. After any other reset it is used only if its check is right.
 
-use crate::store::CRC;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use runtime::PlanarPose;
+use runtime::blob::CRC;
 
 /// Words of the record with its check.
 pub const WORDS: usize = 10;
@@ -228,6 +229,57 @@ fn check(content: &[u32; WORDS - 1]) -> u32 {
         .iter()
         .for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
+}
+
+/// RAM for a record. A program puts it where the start-up code neither clears nor sets it:
+///
+/// ```
+/// use stage_node::retained::RetainedRam;
+///
+/// #[unsafe(link_section = ".uninit.RETAINED")]
+/// static RETAINED: RetainedRam = RetainedRam::new();
+/// # RETAINED.update(|record| record.faults += 1);
+/// # assert_eq!(RETAINED.read().map(|record| record.faults), Some(1));
+/// ```
+#[derive(Debug)]
+pub struct RetainedRam([AtomicU32; WORDS]);
+
+impl Default for RetainedRam {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl RetainedRam {
+    /// RAM without a record.
+    pub const fn new() -> Self {
+        Self([const { AtomicU32::new(0) }; WORDS])
+    }
+
+    /// The record, if its check is right.
+    pub fn read(&self) -> Option<Retained> {
+        let words = core::array::from_fn(|k| self.0.get(k).map_or(0, |word| word.load(Relaxed)));
+        Retained::from_words(&words)
+    }
+
+    /// Replaces the record.
+    pub fn write(&self, record: &Retained) {
+        for (to, word) in self.0.iter().zip(record.to_words()) {
+            to.store(word, Relaxed);
+        }
+    }
+
+    /// Changes the record.
+    pub fn update(&self, change: impl FnOnce(&mut Retained)) {
+        let mut record = self.read().unwrap_or_else(Retained::damaged);
+        change(&mut record);
+        self.write(&record);
+    }
+
+    /// Notes that a step of the start-up begins.
+    pub fn begin(&self, step: Step) {
+        self.update(|record| record.step = step);
+    }
 }
 
 #[cfg(test)]

@@ -2,11 +2,7 @@
 
 use crate::node::Node;
 use crate::records::Choice;
-use crate::retained::{FaultKind, Retained};
-use crate::schedule::TICKS_PER_S;
-
-/// A program that runs for 1 s has started well.
-pub const PROVEN_TICKS: u32 = TICKS_PER_S;
+use crate::retained::{FaultKind, Retained, RetainedRam};
 
 /// The cause of this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +70,13 @@ impl Before {
             choice,
             record,
         }
+    }
+
+    /// Evaluates the record in this RAM, and keeps it there.
+    pub fn of_ram(cause: Cause, ram: &RetainedRam) -> Self {
+        let before = Self::new(cause, ram.read());
+        ram.write(&before.record);
+        before
     }
 
     /// Why nothing runs, after the attempt to load the parameters.

@@ -1,6 +1,6 @@
 //! Two slots of flash with one blob of [`runtime::blob`] each: one runs, the other takes the next.
 //!
-//! Numbers are little-endian. A slot is a sector of 16 KiB; all other bytes are erased.
+//! Numbers are little-endian. A slot is what one erase clears; all other bytes are erased.
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
@@ -23,17 +23,15 @@
 //!   may have touched is never used.
 //! - The sequence number is programmed before the blob: half an update never looks like a probe's blob.
 //! - The commit word follows once all is read back, and its seal after it. Without the seal, a start programs a
-//!   commit word again if it reads right, else to 0 for good ([`settle`]).
+//!   commit word again if it reads right, else to 0 for good ([`Slots::settle`]).
 //!
-//! After a cut the newest blob is the kept blob or the new one, and certainly the new one once [`write`] has ended.
+//! After a cut the newest blob is the kept blob or the new one, and certainly the new one once [`Slots::write`] has ended.
 //! A blob that waits for its activation gives way to the next one.
 
-use crc::{CRC_32_ISCSI, Crc};
+use embedded_storage::nor_flash::MultiwriteNorFlash;
 use hal_adapters::can::update::NotWritten;
-use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAGIC, MAX_BYTES};
+use runtime::blob::{CRC, CRC_BYTES, HEADER_BYTES, MAGIC, MAX_BYTES};
 
-/// Bytes of a slot: sectors 1 and 2 of the STM32F405 (RM0090 rev. 21, table 5).
-pub const SLOT_BYTES: u32 = 16 * 1024;
 /// Number of slots.
 pub const SLOTS: usize = 2;
 
@@ -48,28 +46,6 @@ const COMMITTED: [u8; 4] = *b"COMT";
 const SEALED: [u8; 4] = *b"SEAL";
 const VOID: [u8; 4] = [0; 4];
 const BLANK: [u8; 4] = [0xff; 4];
-
-/// CRC-32C of all that the controller keeps.
-pub static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
-
-/// Both slots, one after the other; offsets count from the start of slot 0. A word may be programmed again as long as
-/// bits only fall (RM0090 rev. 21, section 3.6.4).
-pub trait Flash {
-    /// Reads bytes.
-    fn read(&self, offset: u32, bytes: &mut [u8]);
-
-    /// Programs a word.
-    ///
-    /// # Errors
-    /// [`NotWritten`]: the flash reported an error or did not end in time, or the supply was low before or after.
-    fn program(&mut self, offset: u32, word: [u8; 4]) -> Result<(), NotWritten>;
-
-    /// Erases a slot; it takes half a second.
-    ///
-    /// # Errors
-    /// As [`Flash::program`].
-    fn erase(&mut self, slot: u8) -> Result<(), NotWritten>;
-}
 
 /// A blob in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,13 +78,6 @@ pub enum Contents {
 }
 
 impl Image {
-    /// Reads a slot.
-    pub fn read(flash: &impl Flash, slot: u8) -> Self {
-        let mut image = Self([0xff; USED]);
-        flash.read(at(slot, 0), &mut image.0);
-        image
-    }
-
     /// The blob and its padding.
     pub fn blob(&self) -> &[u8] {
         self.0.get(..SEQUENCE).unwrap_or_default()
@@ -156,93 +125,122 @@ impl Image {
     }
 }
 
-/// Offset from the start of slot 0.
-fn at(slot: u8, offset: usize) -> u32 {
-    u32::from(slot) * SLOT_BYTES + offset as u32
+/// Both slots: two neighbouring units of an erase. A word may be programmed again as long as bits only fall.
+#[derive(Debug)]
+pub struct Slots<F> {
+    /// The flash.
+    pub flash: F,
+    /// Offset of slot 0 in the flash.
+    pub first: u32,
+    /// Whether the supply is too low to write: such flash may read right and not last. Asked before and after each operation.
+    pub supply_is_low: fn() -> bool,
 }
 
-/// Programs a word and reads it back.
-fn program(
-    flash: &mut impl Flash,
-    slot: u8,
-    offset: usize,
-    word: [u8; 4],
-) -> Result<(), NotWritten> {
-    flash.program(at(slot, offset), word)?;
-    expect(flash, slot, offset, word)
-}
+impl<F: MultiwriteNorFlash> Slots<F> {
+    const SLOT_BYTES: usize = {
+        assert!(F::ERASE_SIZE >= USED && F::ERASE_SIZE.is_multiple_of(4));
+        assert!(4_usize.is_multiple_of(F::WRITE_SIZE) && 4_usize.is_multiple_of(F::READ_SIZE));
+        F::ERASE_SIZE
+    };
 
-fn expect(flash: &impl Flash, slot: u8, offset: usize, word: [u8; 4]) -> Result<(), NotWritten> {
-    let mut reads = [0; 4];
-    flash.read(at(slot, offset), &mut reads);
-    if reads == word {
-        Ok(())
-    } else {
-        Err(NotWritten::Failed)
-    }
-}
-
-/// At power-on and after a reset, before anything is read: decides finally whether a slot counts, where an interrupted
-/// operation may have left that open. A word that cannot be programmed costs nothing: its slot is erased before it is
-/// used again.
-pub fn settle(flash: &mut impl Flash) {
-    for slot in [0, 1] {
-        let image = Image::read(flash, slot);
-        let commit = image.word(COMMIT);
-        if image.contents() == Contents::Plain || image.word(SEAL) == SEALED || commit == VOID {
-            continue;
+    /// Reads a slot.
+    pub fn image(&mut self, slot: u8) -> Image {
+        let mut image = Image([0xff; USED]);
+        if self.flash.read(self.at(slot, 0), &mut image.0).is_err() {
+            // Never committed.
+            put(&mut image, COMMIT, VOID);
         }
-        if commit != COMMITTED {
-            let _ = program(flash, slot, COMMIT, VOID);
-        } else if program(flash, slot, COMMIT, COMMITTED).is_ok() {
-            let _ = program(flash, slot, SEAL, SEALED);
-        }
+        image
     }
-}
 
-/// Erases a slot and writes a blob there, under this sequence number; it takes half a second.
-///
-/// # Errors
-/// [`NotWritten`]; the slot then does not count.
-pub fn write(
-    flash: &mut impl Flash,
-    slot: u8,
-    sequence: u32,
-    blob: &[u8],
-) -> Result<Stored, NotWritten> {
-    let mut image = Image([0xff; USED]);
-    let body = image
-        .0
-        .get_mut(..SEQUENCE)
-        .and_then(|body| body.get_mut(..blob.len()));
-    body.ok_or(NotWritten::Failed)?.copy_from_slice(blob);
-    put(&mut image, SEQUENCE, sequence.to_le_bytes());
-    let check = CRC.checksum(image.0.get(..CHECK).unwrap_or_default());
-    put(&mut image, CHECK, check.to_le_bytes());
-
-    program(flash, slot, COMMIT, VOID)?;
-    flash.erase(slot)?;
-    (0..SLOT_BYTES as usize)
-        .step_by(4)
-        .try_for_each(|offset| expect(flash, slot, offset, BLANK))?;
-    program(flash, slot, SEQUENCE, image.word(SEQUENCE))?;
-    for offset in (0..SEQUENCE).step_by(4).chain([CHECK]) {
-        if image.word(offset) != BLANK {
-            program(flash, slot, offset, image.word(offset))?;
+    /// At power-on and after a reset, before anything is read: decides finally whether a slot counts, where an interrupted
+    /// operation may have left that open. A word that cannot be programmed costs nothing: its slot is erased before it is
+    /// used again.
+    pub fn settle(&mut self) {
+        for slot in [0, 1] {
+            let image = self.image(slot);
+            let commit = image.word(COMMIT);
+            if image.contents() == Contents::Plain || image.word(SEAL) == SEALED || commit == VOID {
+                continue;
+            }
+            if commit != COMMITTED {
+                let _ = self.program(slot, COMMIT, VOID);
+            } else if self.program(slot, COMMIT, COMMITTED).is_ok() {
+                let _ = self.program(slot, SEAL, SEALED);
+            }
         }
     }
-    (0..USED)
-        .step_by(4)
-        .try_for_each(|offset| expect(flash, slot, offset, image.word(offset)))?;
-    if let Err(fault) = program(flash, slot, COMMIT, COMMITTED) {
-        // It must not count.
-        let _ = program(flash, slot, COMMIT, VOID);
-        return Err(fault);
+
+    /// Erases a slot and writes a blob there, under this sequence number; it takes half a second.
+    ///
+    /// # Errors
+    /// [`NotWritten`]; the slot then does not count.
+    pub fn write(&mut self, slot: u8, sequence: u32, blob: &[u8]) -> Result<Stored, NotWritten> {
+        let mut image = Image([0xff; USED]);
+        let body = image.0.get_mut(..SEQUENCE);
+        let body = body.and_then(|body| body.get_mut(..blob.len()));
+        body.ok_or(NotWritten::Failed)?.copy_from_slice(blob);
+        put(&mut image, SEQUENCE, sequence.to_le_bytes());
+        let check = CRC.checksum(image.0.get(..CHECK).unwrap_or_default());
+        put(&mut image, CHECK, check.to_le_bytes());
+
+        self.program(slot, COMMIT, VOID)?;
+        let (from, to) = (self.at(slot, 0), self.at(slot + 1, 0));
+        self.operate(|flash| flash.erase(from, to))?;
+        (0..Self::SLOT_BYTES)
+            .step_by(4)
+            .try_for_each(|offset| self.expect(slot, offset, BLANK))?;
+        self.program(slot, SEQUENCE, image.word(SEQUENCE))?;
+        for offset in (0..SEQUENCE).step_by(4).chain([CHECK]) {
+            if image.word(offset) != BLANK {
+                self.program(slot, offset, image.word(offset))?;
+            }
+        }
+        (0..USED)
+            .step_by(4)
+            .try_for_each(|offset| self.expect(slot, offset, image.word(offset)))?;
+        if let Err(fault) = self.program(slot, COMMIT, COMMITTED) {
+            // It must not count.
+            let _ = self.program(slot, COMMIT, VOID);
+            return Err(fault);
+        }
+        // The commit word was read back, and a start seals it.
+        let _ = self.program(slot, SEAL, SEALED);
+        put(&mut image, COMMIT, COMMITTED);
+        image.stored(slot).ok_or(NotWritten::Failed)
     }
-    // The commit word was read back, and a start seals it.
-    let _ = program(flash, slot, SEAL, SEALED);
-    put(&mut image, COMMIT, COMMITTED);
-    image.stored(slot).ok_or(NotWritten::Failed)
+
+    const fn at(&self, slot: u8, offset: usize) -> u32 {
+        self.first + slot as u32 * Self::SLOT_BYTES as u32 + offset as u32
+    }
+
+    /// Programs a word and reads it back.
+    fn program(&mut self, slot: u8, offset: usize, word: [u8; 4]) -> Result<(), NotWritten> {
+        let at = self.at(slot, offset);
+        self.operate(|flash| flash.write(at, &word))?;
+        self.expect(slot, offset, word)
+    }
+
+    /// An operation while the supply is sound.
+    fn operate<E>(&mut self, act: impl FnOnce(&mut F) -> Result<(), E>) -> Result<(), NotWritten> {
+        let is_low = self.supply_is_low;
+        if is_low() {
+            return Err(NotWritten::SupplyLow);
+        }
+        act(&mut self.flash).map_err(|_| NotWritten::Failed)?;
+        match is_low() {
+            true => Err(NotWritten::SupplyLow),
+            false => Ok(()),
+        }
+    }
+
+    fn expect(&mut self, slot: u8, offset: usize, word: [u8; 4]) -> Result<(), NotWritten> {
+        let mut reads = [0; 4];
+        match self.flash.read(self.at(slot, offset), &mut reads) {
+            Ok(()) if reads == word => Ok(()),
+            _ => Err(NotWritten::Failed),
+        }
+    }
 }
 
 fn put(image: &mut Image, offset: usize, word: [u8; 4]) {

@@ -3,9 +3,10 @@
 
 extern crate std;
 
-use super::flash_model::{Cut, FlashModel, Words};
+use super::flash_model::{Cut, FlashModel, Words, slots};
 use super::*;
 use crate::records::{Choice, Records};
+use embedded_storage::nor_flash::NorFlash as _;
 use hal_adapters::can::update::Store;
 use runtime::ParameterSet;
 use runtime::parameters::Text;
@@ -36,7 +37,7 @@ pub(crate) fn crc(blob: &[u8]) -> u32 {
 
 /// A start after power-on.
 pub(crate) fn start(flash: &mut FlashModel) -> Records<&mut FlashModel> {
-    Records::start(flash, Choice::Newest, SERIAL).0
+    Records::start(slots(flash), Choice::Newest, SERIAL).0
 }
 
 /// A flash with these blobs: first the plain blobs of a probe, in slots 0 and 1, then the stored blobs.
@@ -198,7 +199,7 @@ fn any_number_of_cuts_in_a_row_loses_nothing() {
 #[test]
 fn a_word_that_does_not_hold_costs_no_blob_that_was_there() {
     let sound = holding(&[], &[1, 2]);
-    for word in (0..SLOT_BYTES as usize / 4).filter(|word| word % 61 == 0 || *word < USED / 4) {
+    for word in (0..FlashModel::ERASE_SIZE / 4).filter(|word| word % 61 == 0 || *word < USED / 4) {
         let mut flash = sound.clone();
         flash.stuck = Some(word);
         let written = update(&mut flash, &blob(3)).is_ok();
@@ -219,8 +220,7 @@ fn a_word_that_does_not_hold_costs_no_blob_that_was_there() {
 
 #[test]
 fn no_changed_bit_of_a_stored_blob_or_its_number_is_accepted() {
-    let flash = holding(&[], &[1]);
-    let image = Image::read(&flash, 0);
+    let image = slots(&mut holding(&[], &[1])).image(0);
     assert_eq!(image.contents(), Contents::Committed(1));
     for bit in 0..8 * SEAL {
         let mut changed = image.clone();

@@ -4,13 +4,16 @@
 
 use crate::spi::SpiDma;
 use crate::timer::ReadyLine;
-use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use crate::wait::Pause;
+use embedded_hal_bus::spi::ExclusiveDevice;
 use hal_adapters::adc::thermometer::{Thermometer, ntc_103at, tmp235};
 use hal_adapters::adc::{Channels, FrameSampler};
 use hal_adapters::can::NodeNumber;
 use hal_adapters::can::status::{bit, board_check};
-use hal_adapters::can::update::Key;
+use hal_adapters::can::update::{Identity, Key};
 use runtime::zero_offset::ZeroOffsetSettings;
+use stage_node::controller::Settings;
+use stage_node::schedule::Period;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, DMA2, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
@@ -45,7 +48,7 @@ const THERMOMETERS: [Option<&Thermometer>; 2] = [
 ];
 
 /// The SPI bus with chip select, to the converter alone.
-pub type SpiDevice = ExclusiveDevice<SpiDma, PA4<Output>, NoDelay>;
+pub type SpiDevice = ExclusiveDevice<SpiDma, PA4<Output>, Pause>;
 /// SYNC/RESET of the converter. High at rest.
 pub type ControlPin = PB0<Output>;
 /// The LED, on when high.
@@ -122,18 +125,32 @@ pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
     if crystal { (11, 2, 1) } else { (9, 4, 4) }
 }
 
+/// The stage.
+pub fn settings() -> Settings<'static> {
+    let identity = Identity {
+        serial: STAGE_SERIAL,
+        key: STAGE_KEY,
+        program_version: PROGRAM_VERSION,
+    };
+    Settings {
+        identity,
+        period: PERIOD,
+        rezero_limits: rezero_limits(),
+    }
+}
+
 /// Limits of rest at the zero. A stage may rest lower or tilted while its servo is off: then `vertical_max` and the range
 /// of its calibration must hold this position.
-pub fn rezero_limits() -> ZeroOffsetSettings {
+fn rezero_limits() -> ZeroOffsetSettings {
     ZeroOffsetSettings::default()
 }
 
 /// The controller's stage, `STAGE_SERIAL` in the environment of the build: blobs of other stages are refused.
-pub const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
+const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
 
 /// The key of the stage, `STAGE_KEY` in the environment of the build: 32 hexadecimal digits. Without a key every sender
 /// on the bus may replace the parameters while the servo is off.
-pub const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
+const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
     Some(digits) => Some(key(digits)),
     None => None,
 };
@@ -148,6 +165,15 @@ pub const STAGE_NODE: NodeNumber = match option_env!("STAGE_NODE") {
     None => NodeNumber::TABLE,
 };
 
+/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000. At most half of the watchdog's period.
+const PERIOD: Period = match Period::from_us(match option_env!("STAGE_PERIOD_US") {
+    Some(digits) => number(digits),
+    None => 2000,
+}) {
+    Some(period) => period,
+    None => panic!("STAGE_PERIOD_US is to be 1000 to 10000, and a divisor of 1000000"),
+};
+
 const fn key(digits: &str) -> Key {
     assert!(digits.len() == 32, "STAGE_KEY needs 32 hexadecimal digits");
     match u128::from_str_radix(digits, 16) {
@@ -157,7 +183,7 @@ const fn key(digits: &str) -> Key {
 }
 
 /// Major, minor and patch of the program's version in bits 16 to 23, 8 to 15, 0 to 7.
-pub const PROGRAM_VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+const PROGRAM_VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
     | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
     | number(env!("CARGO_PKG_VERSION_PATCH"));
 
@@ -222,7 +248,7 @@ pub fn set_up(
         .release();
     let spi = SpiDma::new(spi1, dma2, rcc);
     // Writing to the pin cannot fail.
-    let Ok(spi) = ExclusiveDevice::new_no_delay(spi, select);
+    let Ok(spi) = ExclusiveDevice::new(spi, select, Pause);
     // Without a transceiver the bus looks idle.
     gpiob
         .pb8

@@ -1,55 +1,18 @@
 //! A fault is noted in RAM that survives a reset, and the core is reset. The next start reports the fault, see
 //! [`stage_node::retained`].
 
-use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use cortex_m::peripheral::{MPU, SCB};
-use stage_node::retained::{FaultKind, Retained, Step, WORDS};
+use stage_node::retained::{FaultKind, RetainedRam};
 use stm32f4xx_hal::pac::RCC;
 
 /// The start-up code neither clears nor sets it.
 #[unsafe(link_section = ".uninit.RETAINED")]
-static mut RETAINED: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
-
-/// The record that is in RAM, if its check is right.
-pub fn retained() -> Option<Retained> {
-    let mut words = [0; WORDS];
-    for (k, word) in words.iter_mut().enumerate() {
-        // SAFETY: within the array; all bits are valid words. The only code that interrupts another access
-        // does not return to it.
-        *word = unsafe { (&raw const RETAINED).cast::<u32>().add(k).read_volatile() };
-    }
-    Retained::from_words(&words)
-}
-
-/// Replaces it.
-pub fn retain(record: &Retained) {
-    for (k, word) in record.to_words().into_iter().enumerate() {
-        // SAFETY: as in `retained`.
-        unsafe {
-            (&raw mut RETAINED)
-                .cast::<u32>()
-                .add(k)
-                .write_volatile(word)
-        };
-    }
-}
-
-/// Changes it.
-pub fn update(change: impl FnOnce(&mut Retained)) {
-    let mut record = retained().unwrap_or_else(Retained::damaged);
-    change(&mut record);
-    retain(&record);
-}
-
-/// Notes that a step of the start-up begins.
-pub fn begin(step: Step) {
-    update(|record| record.step = step);
-}
+pub static RETAINED: RetainedRam = RetainedRam::new();
 
 /// Notes a fault and resets.
-pub fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
-    update(|record| record.note(kind, address, detail));
+fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
+    RETAINED.update(|record| record.note(kind, address, detail));
     SCB::sys_reset()
 }
 

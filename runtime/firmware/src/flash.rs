@@ -1,19 +1,24 @@
 //! Flash of the STM32F405 (RM0090 rev. 21, section 3): the two parameter sectors, and the program's own
 //! bytes.
 
-use crate::supply::Supply;
+use crate::supply;
 use cortex_m::asm;
-use hal_adapters::can::update::NotWritten;
-use stage_node::store::{Flash, SLOT_BYTES, SLOTS};
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase,
+    check_read, check_write,
+};
+use stage_node::store::{SLOTS, Slots};
 use stm32f4xx_hal::pac::FLASH;
 
-const BYTES: usize = SLOTS * SLOT_BYTES as usize;
+/// Bytes of sectors 0 to 3 (table 5).
+const SECTOR_BYTES: usize = 16 << 10;
+const BYTES: usize = SLOTS * SECTOR_BYTES;
 
 unsafe extern "C" {
     static mut _parameter_slot_0: [u8; BYTES];
 }
 
-/// Start of the flash. Sectors 0 to 3 have the bytes of a slot each (table 5).
+/// Start of the flash.
 const FIRST: u32 = 0x0800_0000;
 
 /// The keys that open FLASH_CR, one after the other (section 3.6.1).
@@ -31,31 +36,28 @@ const WORD_LOOKS: u32 = 10_000;
 const SECTOR_LOOKS: u32 = 42_000_000;
 
 /// The parameter sectors of `memory.x`: offset 0 is the start of slot 0, which slot 1 follows.
-pub struct Sectors {
-    registers: FLASH,
-    /// Looked at before and after each operation.
-    pub supply: Supply,
+pub struct Sectors(FLASH);
+
+/// The parameter slots. FLASH_CR is locked after a reset.
+pub const fn slots(registers: FLASH) -> Slots<Sectors> {
+    Slots {
+        flash: Sectors(registers),
+        first: 0,
+        supply_is_low: supply::is_low,
+    }
+}
+
+const fn address(offset: u32) -> *mut u8 {
+    (&raw mut _parameter_slot_0)
+        .cast::<u8>()
+        .wrapping_add(offset as usize)
 }
 
 impl Sectors {
-    /// Takes the registers over; FLASH_CR is locked after a reset.
-    pub const fn new(registers: FLASH, supply: Supply) -> Self {
-        Self { registers, supply }
-    }
-
-    const fn address(offset: u32) -> *mut u8 {
-        (&raw mut _parameter_slot_0)
-            .cast::<u8>()
-            .wrapping_add(offset as usize)
-    }
-
     /// Opens FLASH_CR, does an operation, and locks it again. The operation gives the number of
     /// looks until it is given up. It sets PSIZE to x32, which needs at least 2.7 V (table 13).
-    fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), NotWritten> {
-        if self.supply.is_low() {
-            return Err(NotWritten::SupplyLow);
-        }
-        let registers = &self.registers;
+    fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), NorFlashErrorKind> {
+        let Self(registers) = self;
         if registers.cr().read().lock().bit_is_set() {
             for key in KEYS {
                 // SAFETY: any word may be written; these two open FLASH_CR.
@@ -83,54 +85,69 @@ impl Sectors {
         registers.acr().modify(|_, w| w.dcrst().clear_bit());
         registers.acr().modify(|_, w| w.dcen().set_bit());
         match status & (BUSY | ERRORS) {
-            // The operation may not last.
-            0 if self.supply.is_low() => Err(NotWritten::SupplyLow),
             0 => Ok(()),
-            _ => Err(NotWritten::Failed),
+            _ => Err(NorFlashErrorKind::Other),
         }
     }
 }
 
-/// Whether bytes lie within the sectors.
-const fn is_inside(offset: u32, bytes: usize) -> bool {
-    offset as usize + bytes <= BYTES
+impl ErrorType for Sectors {
+    type Error = NorFlashErrorKind;
 }
 
-impl Flash for Sectors {
-    fn read(&self, offset: u32, bytes: &mut [u8]) {
-        if is_inside(offset, bytes.len()) {
-            for (k, byte) in bytes.iter_mut().enumerate() {
-                // SAFETY: within the sectors of the linker's script, which hold nothing else.
-                *byte = unsafe { Self::address(offset).add(k).read_volatile() };
-            }
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        for (byte, at) in bytes.iter_mut().zip(offset..) {
+            // SAFETY: within the sectors of the linker's script, which hold nothing else.
+            *byte = unsafe { address(at).read_volatile() };
         }
+        Ok(())
     }
 
-    fn program(&mut self, offset: u32, word: [u8; 4]) -> Result<(), NotWritten> {
-        if !offset.is_multiple_of(4) || !is_inside(offset, 4) {
-            return Err(NotWritten::Failed);
-        }
-        self.operate(|registers| {
-            (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
-            let address = Self::address(offset).cast::<u32>();
-            // SAFETY: within the sectors, which the linker's script aligns to words. A write to flash
-            // programs it while PG is set (section 3.6.4).
-            unsafe { address.write_volatile(u32::from_le_bytes(word)) };
-            WORD_LOOKS
-        })
-    }
-
-    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
-        let start = Self::address(u32::from(slot & 1) * SLOT_BYTES) as u32;
-        let sector = (start - FIRST) / SLOT_BYTES;
-        self.operate(|registers| {
-            // SAFETY: the number of a sector, 1 to 3: `memory.x` links with no other slots.
-            registers.cr().modify(|_, w| unsafe {
-                w.psize().psize32().ser().set_bit();
-                w.snb().bits(sector as u8)
-            });
-            registers.cr().modify(|_, w| w.strt().set_bit());
-            SECTOR_LOOKS
-        })
+    fn capacity(&self) -> usize {
+        BYTES
     }
 }
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR_BYTES;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        let (words, _) = bytes.as_chunks();
+        for (word, at) in words.iter().zip((offset..).step_by(4)) {
+            self.operate(|registers| {
+                (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
+                // SAFETY: within the sectors, which the linker's script aligns to words. A write to flash
+                // programs it while PG is set (section 3.6.4).
+                unsafe { (address(at).cast::<u32>()).write_volatile(u32::from_le_bytes(*word)) };
+                WORD_LOOKS
+            })?;
+        }
+        Ok(())
+    }
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        for offset in (from..to).step_by(SECTOR_BYTES) {
+            let sector = (address(offset) as u32 - FIRST) / SECTOR_BYTES as u32;
+            self.operate(|registers| {
+                // SAFETY: the number of a sector, 1 to 3: `memory.x` links with no other slots.
+                registers.cr().modify(|_, w| unsafe {
+                    w.psize().psize32().ser().set_bit();
+                    w.snb().bits(sector as u8)
+                });
+                registers.cr().modify(|_, w| w.strt().set_bit());
+                SECTOR_LOOKS
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// A word may be programmed again as long as bits only fall (section 3.6.4).
+impl MultiwriteNorFlash for Sectors {}

@@ -7,9 +7,8 @@ use embedded_hal::spi::{ErrorKind, ErrorType, SpiBus};
 use stm32f4xx_hal::pac::{DMA2, SPI1};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Streams that serve SPI1, and their channel (table 43).
-const RECEIVE: usize = 0;
-const SEND: usize = 3;
+/// Streams that serve SPI1 and their directions, the receiver first, and their channel (table 43).
+const STREAMS: [(usize, u32); 2] = [(0, 0), (3, TO_PERIPHERAL)];
 const CHANNEL: u32 = 3 << 25;
 /// Bits of DMA_SxCR (section 10.5.5): enable, from memory to the peripheral, one address after the
 /// other in memory, highest priority. Units are bytes.
@@ -57,8 +56,10 @@ impl SpiDma {
         spi.cr2().modify(|_, w| w.rxdmaen().set_bit());
         // SAFETY: bits that are cleared by writing 1.
         dma.lifcr().write(|w| unsafe { w.bits(ALL_FLAGS) });
-        for (stream, direction) in [(RECEIVE, 0), (SEND, TO_PERIPHERAL)] {
-            let registers = dma.st(stream);
+        for (stream, direction) in STREAMS {
+            let Some(registers) = dma.st_iter().nth(stream) else {
+                return Err(ErrorKind::Other);
+            };
             let settings = CHANNEL | FIRST | NEXT_ADDRESS | direction;
             // SAFETY: the data register of SPI1, and memory that the caller lends until this returns: no
             // stream is on any more then.

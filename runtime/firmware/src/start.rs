@@ -4,7 +4,7 @@
 //! HAL waits without end, for the PLL, the watchdog resets, and the next start knows.
 
 use crate::board::{self, INTERNAL_MHZ};
-use crate::fault;
+use crate::fault::RETAINED;
 use crate::wait::Stopwatch;
 use crate::watchdog::Watchdog;
 use hal_adapters::can::status::{BoardFacts, bit, board_check};
@@ -34,9 +34,7 @@ pub fn before(rcc: &RCC) -> Before {
     } else {
         Cause::Reset
     };
-    let before = Before::new(cause, fault::retained());
-    fault::retain(&before.record);
-    before
+    Before::of_ram(cause, &RETAINED)
 }
 
 /// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not start, the PLL did not lock
@@ -48,7 +46,7 @@ pub fn clocks(
     stopwatch: &mut Stopwatch,
 ) -> (Rcc, bool) {
     let failed = before.by_fault && before.record.fault.is_of_the_crystal();
-    fault::begin(Step::Clocks);
+    RETAINED.begin(Step::Clocks);
     let crystal = !failed && {
         rcc.cr().modify(|_, w| w.hseon().set_bit());
         let ready = || rcc.cr().read().hserdy().bit_is_set();
@@ -59,7 +57,7 @@ pub fn clocks(
     };
     if !crystal {
         rcc.cr().modify(|_, w| w.hseon().clear_bit());
-        fault::begin(Step::InternalClock);
+        RETAINED.begin(Step::InternalClock);
     }
     let rcc = rcc.freeze(board::clocks(crystal));
     if crystal {

@@ -12,35 +12,20 @@ const LEVEL: u8 = 0b111;
 /// From the detector's start until its output is looked at, us. The sheet gives no time.
 const START_US: u32 = 100;
 
-/// The detector.
-pub struct Supply {
-    registers: PWR,
+/// Starts the detector, and waits until the supply is sound, however long that takes.
+pub fn wait(registers: &PWR, rcc: &RCC, watchdog: &mut Watchdog, stopwatch: &mut Stopwatch) {
+    rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+    // A register is to be written two cycles after its clock was switched on (RM0090, section 7.2).
+    let _ = rcc.apb1enr().read();
+    (registers.cr()).modify(|_, w| w.pls().set(LEVEL).pvde().set_bit());
+    stopwatch.until(INTERNAL_MHZ, START_US, || false);
+    while is_low() {
+        watchdog.feed();
+    }
 }
 
-impl Supply {
-    /// Starts the detector, and waits until the supply is sound, however long that takes.
-    pub fn wait(
-        registers: PWR,
-        rcc: &RCC,
-        watchdog: &mut Watchdog,
-        stopwatch: &mut Stopwatch,
-    ) -> Self {
-        rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
-        // A register is to be written two cycles after its clock was switched on (RM0090, section 7.2).
-        let _ = rcc.apb1enr().read();
-        registers
-            .cr()
-            .modify(|_, w| w.pls().set(LEVEL).pvde().set_bit());
-        let supply = Self { registers };
-        stopwatch.until(INTERNAL_MHZ, START_US, || false);
-        while supply.is_low() {
-            watchdog.feed();
-        }
-        supply
-    }
-
-    /// Whether it is below the threshold now.
-    pub fn is_low(&self) -> bool {
-        self.registers.csr().read().pvdo().bit_is_set()
-    }
+/// Whether it is below the threshold now.
+pub fn is_low() -> bool {
+    // SAFETY: reading this register changes nothing.
+    unsafe { (*PWR::PTR).csr().read().pvdo().bit_is_set() }
 }

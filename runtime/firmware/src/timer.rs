@@ -46,11 +46,6 @@ impl Clock {
         ReadyLine { seen_us: 0 }
     }
 
-    /// Now, us.
-    pub fn now_us(&self) -> u32 {
-        self.timer.cnt().read().cnt().bits()
-    }
-
     /// Sets off alarm `N`, [`TICK`] or [`SETTLED`], at `due_us`; at once, if that is past.
     pub fn set_alarm<const N: u8>(&mut self, due_us: u32) {
         self.timer.ccr(N.into()).write(|w| w.ccr().set(due_us));
@@ -59,7 +54,7 @@ impl Clock {
             .sr()
             .write(|w| w.cc1if().bit(N != TICK).cc2if().bit(N != SETTLED));
         self.timer.dier().modify(|_, w| w.ccie(N).set_bit());
-        if self.now_us().wrapping_sub(due_us) < u32::MAX / 2 {
+        if now_us().wrapping_sub(due_us) < u32::MAX / 2 {
             self.timer.egr().write(|w| w.ccg(N).set_bit());
         }
     }
@@ -85,23 +80,26 @@ pub struct ReadyLine {
     seen_us: u32,
 }
 
-impl ReadyLine {
-    /// The timer, which [`Clock`] has started.
-    const fn timer() -> &'static RegisterBlock {
-        // SAFETY: two registers are read, and reading CCR3 changes a flag that nothing uses.
-        unsafe { &*TIM2::PTR }
-    }
+/// The timer, which [`Clock`] has started.
+const fn timer() -> &'static RegisterBlock {
+    // SAFETY: two registers are read, and reading CCR3 changes a flag that nothing uses.
+    unsafe { &*TIM2::PTR }
+}
+
+/// Now, us.
+pub fn now_us() -> u32 {
+    timer().cnt().read().cnt().bits()
 }
 
 impl hal_adapters::adc::Clock for ReadyLine {
     fn now_us(&mut self) -> u32 {
-        Self::timer().cnt().read().cnt().bits()
+        now_us()
     }
 }
 
 impl DataReady for ReadyLine {
     fn fell_us(&mut self) -> Option<u32> {
-        let fell_us = Self::timer().ccr(2).read().ccr().bits();
+        let fell_us = timer().ccr(2).read().ccr().bits();
         (core::mem::replace(&mut self.seen_us, fell_us) != fell_us).then_some(fell_us)
     }
 }

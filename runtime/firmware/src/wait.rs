@@ -1,7 +1,9 @@
 //! Waits that end whatever happens, by the system timer of the core. Only the start-up waits.
 
+use crate::board::CORE_HZ;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
+use embedded_hal::delay::DelayNs;
 
 /// The system timer, which nothing else uses.
 pub struct Stopwatch {
@@ -27,5 +29,14 @@ impl Stopwatch {
             }
         }
         true
+    }
+}
+
+/// A pause of the core, by its cycles.
+pub struct Pause;
+
+impl DelayNs for Pause {
+    fn delay_ns(&mut self, ns: u32) {
+        cortex_m::asm::delay(ns.div_ceil(1000) * (CORE_HZ / 1_000_000));
     }
 }

@@ -3,7 +3,7 @@
 //! lies in it.
 
 use ::tests::flash_model::{Cut, FlashModel as Sectors};
-use stage_node::store::Flash;
+use embedded_storage::nor_flash::ReadNorFlash;
 use std::collections::VecDeque;
 
 /// Start of sector 1.
@@ -135,7 +135,8 @@ impl FlashModel {
     /// Reads 1 to 8 bytes, lowest first.
     pub fn read(&mut self, offset: usize, bytes: usize) -> u64 {
         let mut read = [0; 8];
-        self.sectors.read(offset as u32, &mut read[..bytes]);
+        let whole = self.sectors.read(offset as u32, &mut read[..bytes]);
+        whole.expect("within the sectors");
         u64::from_le_bytes(read)
     }
 

@@ -8,7 +8,6 @@
 
 use hal_adapters::can::{BusFrame, Message, NodeNumber};
 use hal_adapters::socketcan::SocketCan;
-use stage_node::schedule::Schedule;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::process::ExitCode;
@@ -48,11 +47,10 @@ fn run(arguments: &[String]) -> Result<bool, Box<dyn Error>> {
     let started = Instant::now();
     let now_us = || started.elapsed().as_micros() as u32;
     let mut received = VecDeque::new();
-    let mut schedule = Schedule::starting(now_us());
     loop {
         // However late it is on a busy machine, the bus is looked at.
         loop {
-            let left_us = schedule.due_us().wrapping_sub(now_us()).cast_signed();
+            let left_us = node.due_us().wrapping_sub(now_us()).cast_signed();
             let left_us = left_us.max(0).cast_unsigned();
             match bus.receive(Duration::from_micros(left_us.into()))? {
                 Some(stamped) => received.push_back(stamped.frame),
@@ -60,9 +58,9 @@ fn run(arguments: &[String]) -> Result<bool, Box<dyn Error>> {
                 None => {}
             }
         }
-        schedule.start_tick(now_us());
         let taken = received.len().min(TAKEN_PER_TICK);
-        let stored = node.tick(schedule.missed(), received.drain(..taken));
+        let late_us = now_us().wrapping_sub(node.due_us());
+        let stored = node.tick(late_us, received.drain(..taken));
         while let Some(coded) = node.send() {
             bus.send(&BusFrame::from(coded), SEND_DEADLINE)?;
         }
@@ -72,12 +70,11 @@ fn run(arguments: &[String]) -> Result<bool, Box<dyn Error>> {
         };
         if let Some(deaf) = deaf {
             if !stored {
-                node.reset();
+                node.reset(START.as_micros() as u32);
             }
             std::thread::sleep(deaf);
             received.clear();
             while bus.receive(Duration::ZERO)?.is_some() {}
-            schedule = Schedule::starting(now_us());
         }
     }
 }

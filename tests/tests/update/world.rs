@@ -89,7 +89,7 @@ impl World {
             self.heard.push_back(frame);
         }
         if self.node.is_to_be_reset() {
-            self.node.reset();
+            self.node.reset(START_US as u32);
             self.fifo.clear();
             self.deaf_until_us = self.now_us + START_US;
         }
@@ -127,7 +127,7 @@ impl World {
         on::identify(&mut self.talk()).expect("it answers")
     }
 
-    pub fn newest(&self) -> Vec<u8> {
+    pub fn newest(&mut self) -> Vec<u8> {
         self.node.newest().expect("there is one")
     }
 }

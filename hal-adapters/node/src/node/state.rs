@@ -15,7 +15,7 @@ use crate::records::Loaded;
 use crate::start_up::Stop;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::status::NodeState;
-use runtime::{AnyDecoder, OnInvalid, PoseTracker, RawFrame, Reading, Status};
+use runtime::{OnInvalid, PoseTracker, RawFrame, Reading, Status};
 
 /// First reason of [`NodeState::SensorFault`] for a code at a rail; its channel is added (0 to 2 Hall A to C, 3 to 5
 /// gaps 1 to 3). Reasons below: [`AdcError::number`].
@@ -45,23 +45,23 @@ impl<B> From<&AdcError<B>> for SampleFault {
 
 /// The parameters of a node.
 #[derive(Clone, Debug)]
-pub struct Parameters<'d> {
+pub struct Parameters {
     /// The decoder; none if the node must not decode.
-    pub(super) servo: Option<PoseTracker<&'d AnyDecoder>>,
+    pub(super) servo: Option<PoseTracker>,
     /// State and reason of a tick without faults.
     state: (NodeState, u8),
 }
 
-impl<'d> Parameters<'d> {
+impl Parameters {
     /// At start-up: the loaded parameters, the reason why a slot is refused, and the reason to stop. `is_sound`: the
     /// arithmetic equals the host's; else the node decodes nothing.
     pub fn at_start(
-        loaded: Option<&'d Loaded>,
+        loaded: Option<Loaded>,
         refusal: Option<u8>,
         stop: Option<Stop>,
         is_sound: bool,
     ) -> Self {
-        let servo = loaded.map(|loaded| PoseTracker::new(&loaded.decoder, OnInvalid::Zero));
+        let servo = loaded.map(|loaded| PoseTracker::new(loaded.decoder, OnInvalid::Zero));
         let servo = servo.filter(|_| is_sound && stop.is_none());
         let state = match (stop, refusal) {
             _ if !is_sound => (NodeState::SelfTestFailed, REASON_FPU),

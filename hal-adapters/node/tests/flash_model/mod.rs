@@ -13,11 +13,16 @@
 
 extern crate std;
 
-use super::{Flash, NotWritten, SLOT_BYTES};
+use super::Slots;
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash,
+};
 use std::vec;
 use std::vec::Vec;
 
-const BYTES: usize = 2 * SLOT_BYTES as usize;
+/// Bytes of a sector.
+const SECTOR: usize = 16 << 10;
+const BYTES: usize = 2 * SECTOR;
 
 /// The place of a cut in an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +103,7 @@ pub struct FlashModel {
     pub stuck: Option<usize>,
 }
 
-const OFF: NotWritten = NotWritten::Failed;
+const OFF: NorFlashErrorKind = NorFlashErrorKind::Other;
 
 impl FlashModel {
     /// Both sectors erased.
@@ -122,8 +127,8 @@ impl FlashModel {
     /// # Panics
     /// If they are longer than a sector.
     pub fn load(&mut self, slot: u8, contents: &[u8]) {
-        let at = usize::from(slot) * SLOT_BYTES as usize;
-        let bytes = &mut self.bytes[at..at + SLOT_BYTES as usize];
+        let at = usize::from(slot) * SECTOR;
+        let bytes = &mut self.bytes[at..at + SECTOR];
         bytes.fill(0xff);
         bytes[..contents.len()].copy_from_slice(contents);
     }
@@ -170,7 +175,7 @@ impl FlashModel {
     }
 
     /// The cut of this operation.
-    fn next(&mut self) -> Result<Option<Cut>, NotWritten> {
+    fn next(&mut self) -> Result<Option<Cut>, NorFlashErrorKind> {
         if self.off {
             return Err(OFF);
         }
@@ -183,20 +188,21 @@ impl FlashModel {
         Ok(cut)
     }
 
-    fn end(&self, cut: Option<Cut>) -> Result<(), NotWritten> {
+    fn end(&self, cut: Option<Cut>) -> Result<(), NorFlashErrorKind> {
         if cut.is_some() || self.reports == Some(self.operations - 1) {
             return Err(OFF);
         }
         Ok(())
     }
-}
 
-impl Flash for FlashModel {
-    fn read(&self, offset: u32, bytes: &mut [u8]) {
-        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
-    }
-
-    fn program(&mut self, offset: u32, value: [u8; 4]) -> Result<(), NotWritten> {
+    /// Programs a word.
+    ///
+    /// # Errors
+    /// A reported error, or the power is off.
+    ///
+    /// # Panics
+    /// If `offset` is no address of a word.
+    pub fn program(&mut self, offset: u32, value: [u8; 4]) -> Result<(), NorFlashErrorKind> {
         assert_eq!(offset % 4, 0, "an address of a word");
         let (word, value) = (offset as usize / 4, u32::from_le_bytes(value));
         let cut = self.next()?;
@@ -225,8 +231,12 @@ impl Flash for FlashModel {
         self.end(cut)
     }
 
-    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
-        const WORDS: usize = SLOT_BYTES as usize / 4;
+    /// Erases a sector.
+    ///
+    /// # Errors
+    /// As [`FlashModel::program`].
+    pub fn erase(&mut self, slot: u8) -> Result<(), NorFlashErrorKind> {
+        const WORDS: usize = SECTOR / 4;
         let from = usize::from(slot) * WORDS;
         let cut = self.next()?;
         if cut == Some(Cut::Before) {
@@ -258,18 +268,45 @@ impl Flash for FlashModel {
     }
 }
 
-/// For stores that borrow their flash.
-impl Flash for &mut FlashModel {
-    fn read(&self, offset: u32, bytes: &mut [u8]) {
-        (**self).read(offset, bytes);
+impl ErrorType for FlashModel {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for FlashModel {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+        Ok(())
     }
 
-    fn program(&mut self, offset: u32, value: [u8; 4]) -> Result<(), NotWritten> {
-        (**self).program(offset, value)
+    fn capacity(&self) -> usize {
+        BYTES
+    }
+}
+
+impl NorFlash for FlashModel {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        assert_eq!(to - from, SECTOR as u32, "a sector");
+        Self::erase(self, (from / SECTOR as u32) as u8)
     }
 
-    fn erase(&mut self, slot: u8) -> Result<(), NotWritten> {
-        (**self).erase(slot)
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        self.program(offset, bytes.try_into().expect("a word"))
+    }
+}
+
+impl MultiwriteNorFlash for FlashModel {}
+
+/// Both sectors as slots, with a sound supply.
+pub const fn slots<F>(flash: F) -> Slots<F> {
+    Slots {
+        flash,
+        first: 0,
+        supply_is_low: || false,
     }
 }
 

@@ -13,7 +13,7 @@ use hal_adapters::can::status::{board_check, flag};
 /// An address without memory and peripheral.
 pub const NOWHERE: u32 = 0x6000_0000;
 /// The function of the tick's arithmetic, where faults are put in.
-pub const TICK: &str = "firmware4node3run";
+pub const TICK: &str = "stage_node4node3run";
 
 /// Prints the row of a fault. `reported` is the tick of the first frame that reports it.
 pub fn row(bench: &Bench, fault: &str, at: u64, reported: Option<u64>, axes: &[Axis]) {
@@ -80,11 +80,12 @@ pub fn slow_crystal(bench: &Bench) {
 
 /// A bit of the parameters in RAM flips: the program resets and loads them again.
 pub fn parameters_change(bench: &Bench) {
-    let constants = bench.image.range("local_init_loaded").expect("a static");
-    for word in [10, 60, 110] {
+    for k in 0..3 {
         let mut machine = bench.running(700);
         let at = tick_now(&machine);
-        machine.flip(constants.start, 32 * word + 20);
+        let constants = constants(bench, &machine);
+        // Around the middle: a few of the first are in the last pose.
+        machine.flip(constants[constants.len() / 2 + 5 * k], 20);
         let seen = Seen::after(&mut machine, 600);
         assert_eq!((machine.panics, machine.watchdog_resets), (1, 0));
         assert_eq!(reported_fault(&seen), Some([6, 0, 0]));
@@ -101,6 +102,26 @@ pub fn parameters_change(bench: &Bench) {
         assert_eq!(wrong_valid(&late, &bench.poses, 1), 0);
         assert!(valid(&late) > 1000);
     }
+}
+
+/// Addresses of the static words that are numbers of the blob, bit for bit.
+fn constants(bench: &Bench, machine: &Machine) -> Vec<u32> {
+    let is_number = |word: &u32| {
+        let size = f32::from_bits(*word).abs();
+        word.trailing_zeros() < 8 && (1e-9..1e9).contains(&size) && !word.to_le_bytes().is_ascii()
+    };
+    let words = bench
+        .blob
+        .windows(4)
+        .map(|w| u32::from_le_bytes(w.try_into().expect("four")));
+    let words: Vec<_> = words.filter(is_number).collect();
+    let statics = crate::image::RAM + bench.image.stack_bytes as u32;
+    let addresses = (statics..statics + bench.image.static_bytes as u32).step_by(4);
+    let found: Vec<_> = addresses
+        .filter(|at| words.contains(&machine.word(*at)))
+        .collect();
+    assert!(found.len() > 20, "only {} constants", found.len());
+    found
 }
 
 /// Without a crystal the internal oscillator serves; flag, check and light show it. The crystal is absent,

@@ -110,7 +110,7 @@ fuzz_target!(|data: &[u8]| {
             while controller.send().is_some() {}
         }
         if controller.is_to_be_reset() {
-            controller.reset();
+            controller.reset(0);
         }
         if controller.records() != records {
             records += 1;
