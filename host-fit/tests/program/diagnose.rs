@@ -52,7 +52,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
         ),
         (
             "gaps.csv",
-            "capacitive sensor 1 and capacitive sensor 2 seem to be swapped; exchanged, the log fits stage.toml",
+            "capacitive sensor 1 and capacitive sensor 2 are exchanged",
             "capacitive_swapped",
         ),
     ] {

@@ -193,7 +193,7 @@ fn a_log_of_little_motion_is_a_warning() {
     let stage = stage.replace("rz = { service_rad = 500e-6", "rz = { service_rad = 1.2e-3");
     bench.write("wide.toml", stage);
     let fit = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
-    assert!(stderr(&fit).contains("moves Rz by 5"), "{}", stderr(&fit));
+    assert!(stderr(&fit).contains("Rz moves +-5"), "{}", stderr(&fit));
     let fit = bench.good("fit log.csv --out p.bin --model field");
     assert_eq!(stderr(&fit), "");
 }

@@ -97,7 +97,7 @@ pub fn remedy(found: &Finding) -> String {
 mod tests {
     use super::*;
     use hallstage_input::channel::Channel;
-    use hallstage_input::finding::{Quantity, TimeCourse};
+    use hallstage_input::finding::{Cause, Correction, Quantity, TimeCourse};
 
     #[test]
     fn a_message_has_evidence_with_units_place_alternatives_and_remedy() {
@@ -141,6 +141,29 @@ mod tests {
         assert_eq!(
             message(&stands),
             "Capacitive sensor 2 never changes. Is it connected?"
+        );
+        let swapped = Kind::Mistake {
+            code: Code::BeamsSwapped,
+            causes: vec![Cause {
+                correction: Correction::Exchange([Channel::BeamY1, Channel::BeamY2]),
+                values: None,
+            }],
+            is_sure: true,
+            may_be_magnets: false,
+        };
+        assert_eq!(
+            message(&Finding::new(swapped)),
+            "Beam Y1 and beam Y2 seem to be swapped; exchanged, the log fits stage.toml. Check the column order."
+        );
+        let moves = Kind::OtherMotion {
+            micro: 1002.0,
+            service_micro: 500.0,
+            unit: "um",
+            is_scale: true,
+        };
+        assert_eq!(
+            message(&Finding::new(moves).with_channel(Channel::X)),
+            "X moves ±1002 µm; [motion] says ±500 µm. Correct the scale or [motion]."
         );
         let bits = vec![4, 5];
         let stuck = Finding::new(Kind::StuckBits { bits, step_um: 3.0 });

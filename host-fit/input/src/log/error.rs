@@ -2,6 +2,7 @@
 
 use super::cell::CellFault;
 use super::pattern::Pattern;
+use crate::axis::counted;
 use crate::source::{SourceError, SourceProblem};
 use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::path::PathBuf;
@@ -217,7 +218,7 @@ pub enum LogProblem {
         header: usize,
     },
     /// A line with more or fewer cells than the header.
-    #[error("{found} cells where the header has {expected}; correct or remove the line")]
+    #[error("{} where the header has {expected}; correct or remove the line", counted(*found, "cell"))]
     CellCount {
         /// Cells of the header.
         expected: usize,

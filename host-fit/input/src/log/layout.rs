@@ -76,7 +76,7 @@ macro_rules! quantities {
 #[rustfmt::skip]
 quantities! {
     Movement, "movement", "movement", Index, "", "number of the movement", ["movement" "move" "run" "segment" "motion" "trial"];
-    Time, "time", "t_us", Time, "", "time of the sample", ["t" "time" "timestamp" "datetime" "elapsed" "zeit" "zeitstempel" "date" "xvalue" "xaxis"];
+    Time, "time", "t_us", Time, "", "time of the sample", ["t" "time" "timestamp" "datetime" "elapsed" "zeit" "zeitstempel" "xvalue" "xaxis"];
     BeamX, "ifm_x", "ifm_x_nm", Length, "", "interferometer along X", ["ifmx" "interferometerx" "laserx" "beamx" "x1"];
     BeamY1, "ifm_y1", "ifm_y1_nm", Length, "", "interferometer along Y at x = +baseline/2", ["ifmy1" "interferometery1" "lasery1" "beamy1" "y1"];
     BeamY2, "ifm_y2", "ifm_y2_nm", Length, "", "interferometer along Y at x = -baseline/2", ["ifmy2" "interferometery2" "lasery2" "beamy2" "y2"];
