@@ -32,7 +32,7 @@ pub use known::{StoredPosterior, own_logs};
 use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
-use crate::fit::{RANGE_MARGIN, calibration};
+use crate::fit::calibration;
 use crate::judge::in_motion::by_lags;
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
@@ -45,8 +45,6 @@ use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::noise::USUAL_DRIFT;
 use hallstage_solver::estimator::parameters::FieldParameters;
-use hallstage_solver::estimator::posterior::Posterior;
-use hallstage_solver::estimator::service::ServiceVariance;
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::update::{Change, update};
 use runtime::calibration::Origin;
@@ -70,7 +68,7 @@ pub struct Recalibration {
     /// Change of the gain of A, B, C, in parts of the old one, with its standard error.
     pub gains: [(f64, f64); 3],
     /// The errors in service to expect of the old blob.
-    pub predicted_before: Option<Predicted>,
+    pub predicted_before: Predicted,
     /// Chi-square over residuals.
     pub chi_squared: f64,
     /// Errors over the log by the target's decoder, with the new and with the old blob; zero
@@ -180,20 +178,10 @@ pub fn recalibrate(
         change,
         drift,
     )?;
-    let range = |words: [f32; 3]| words.map(|x| f64::from(x) / RANGE_MARGIN);
-    let ranges = (
-        range(old.constants.calibrated_planar),
-        range(old.constants.calibrated_vertical),
-    );
-    let expected = |parameters: &FieldParameters, posterior: &Posterior| {
-        ServiceVariance::new(parameters, posterior, &old_parameters, ranges)
-    };
-    let service = expected(&update.parameters, &update.posterior);
-    let open_before = covariance.map_or([0.0; 3], |covariance| {
-        let posterior =
-            Posterior::from_covariance(covariance.clone(), &old_parameters, &update.noise);
-        expected(&old_parameters, &posterior).systematic
-    });
+    let at_work = declared_service(stage, &update.parameters, update.noise.white_m);
+    let at_work = at_work.ok_or(FieldFitError::Singular)?;
+    let service = at_work.variance(&update.posterior.covariance);
+    let open_before = covariance.map_or([0.0; 3], |of| at_work.variance(of).systematic);
     let open_max = match change {
         Change::Gain | Change::Gains => OPEN_MAX_GAINS,
         Change::All | Change::Temperature => OPEN_MAX_ALL,
@@ -216,18 +204,14 @@ pub fn recalibrate(
     let set = with_parameters(old, &update.parameters, stage, &origin)
         .map_err(RecalibrateError::Unusable)?;
     let judgement = judged(&set);
-    let at_work = declared_service(stage, &update.parameters, update.noise.white_m);
-    let expect = |off: &[f64]| {
-        let at_work = at_work.as_ref()?;
-        Some(Predicted::new(at_work, &update.posterior.covariance, off))
-    };
+    let expect = |off: &[f64]| Predicted::new(&at_work, &update.posterior.covariance, off);
     let predicted = expect(&[0.0; COUNT]);
     let (white_m, covariance) = (update.noise.white_m, &update.posterior.covariance);
     let validity =
         known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
     let temperature = set.constants.temperature.rounded();
     let of_posterior = (&update.parameters, &update.posterior);
-    let mut diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(predicted));
+    let mut diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(Some(predicted)));
     let late = by_lags(lags_s(&diagnosis.findings), &update.parameters, stage);
     let late = late.unwrap_or_default();
     diagnosis.predicted = diagnosis.predicted.map(|of| of.with_added(late));
@@ -251,12 +235,8 @@ pub fn recalibrate(
     let off = old.as_flattened().iter().zip(new.as_flattened());
     let off: Vec<f64> = off.map(|(old, new)| old - new).collect();
     // What the sensors add in service, they add to both.
-    let added = |of: Predicted, after: &Predicted| {
-        let at_rest = predicted.map_or(after.rms, |at_rest| at_rest.rms);
-        of.with_added([0, 1, 2].map(|k| after.rms[k].powi(2) - at_rest[k].powi(2)))
-    };
-    let after = diagnosis.predicted.as_ref();
-    let predicted_before = expect(&off).zip(after).map(|(of, after)| added(of, after));
+    let after = diagnosis.predicted.unwrap_or(predicted);
+    let added = [0, 1, 2].map(|k| after.rms[k].powi(2) - predicted.rms[k].powi(2));
     Ok(Recalibration {
         set: ParameterSet { fit, ..set },
         known: known.map(|known| StoredPosterior {
@@ -266,7 +246,7 @@ pub fn recalibrate(
             ..known.clone().with_logs(dataset)
         }),
         gains,
-        predicted_before,
+        predicted_before: expect(&off).with_added(added),
         chi_squared: update.chi_squared / update.residuals.max(1) as f64,
         judgement,
         judgement_before,

@@ -10,7 +10,6 @@ use crate::report::table::Table;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
-use hallstage_calibration::judge::predicted::Predicted;
 use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_calibration::recalibrate::{
     RecalibrateError, Recalibration, StoredPosterior, own_logs, recalibrate,
@@ -69,9 +68,9 @@ impl Updated {
         };
         let left = updated.subject().decision();
         updated.figures.set("decision", json!(left));
-        let found = updated.new.predicted_before;
-        let found = found.map(|of| json!(decision.figures(of.rms, decision.passes(of.rms))));
-        updated.figures.set("decision_as_found", found);
+        let found = updated.new.predicted_before.rms;
+        let found = decision.figures(found, decision.passes(found));
+        updated.figures.set("decision_as_found", json!(found));
         Ok(updated)
     }
 
@@ -115,10 +114,10 @@ impl Updated {
             )
         };
         let found = new.predicted_before;
-        let passes = found.map_or([None; 3], |of| self.decision.passes(of.rms));
+        let passes = self.decision.passes(found.rms);
         let left = self.subject().passes();
         for (state, judgement, predicted, passes) in [
-            ("as found", &new.judgement_before, found, passes),
+            ("as found", &new.judgement_before, Some(found), passes),
             ("as left", &new.judgement, new.diagnosis.predicted, left),
         ] {
             for (k, axis) in PLANAR.iter().enumerate() {
@@ -181,9 +180,8 @@ fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
 fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Group {
     let gain = |(change, error): (f64, f64)| group! { "change" => figure(change * 100.0, "%").with_error(Some(error * 100.0)) };
     let [a, b, c] = new.gains.map(gain);
-    let (before, after) = (new.predicted_before, new.diagnosis.predicted);
-    let rms = |of: Option<Predicted>| of.map(|of| pose(of.rms));
-    let floor = after.map(|of| pose([0, 1, 2].map(|axis| of.noise(axis))));
+    let before = new.predicted_before;
+    let floor = [0, 1, 2].map(|axis| before.noise(axis));
     group! {
         "what" => name_of(&change),
         "rows" => log.dataset.rows.len(),
@@ -192,7 +190,7 @@ fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[St
         // Predicted for the declared service: with the old blob, with the new one, and from the noise of the
         // probes alone.
         "predicted_service" => group! {
-            "before" => rms(before), "after" => rms(after), "floor" => floor,
+            "before" => pose(before.rms), "after" => new.diagnosis.predicted.map(|of| pose(of.rms)), "floor" => pose(floor),
         },
         // Whether there was an old posterior, and so a new posterior.
         "posterior" => new.known.is_some(),

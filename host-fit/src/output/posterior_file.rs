@@ -6,47 +6,24 @@
 use crate::output::file::is_stream;
 use crate::output::{OutputError, Outputs, blob_file};
 use hallstage_calibration::budget::Budget;
-use hallstage_calibration::judge::in_motion::UpTo;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::source::{SourceError, read_whole};
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
 use runtime::ParameterSet;
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8] = b"HALLPOS3";
 /// Rows of the covariance without and with k and h.
 const ROWS: [usize; 2] = [COUNT, COUNT + 6];
-/// The file has lengths in mm and angles in mrad.
-const MM_PER_M: f64 = 1e3;
 /// Largest file that is read.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// What the file holds.
-#[derive(Serialize, Deserialize)]
-struct Content {
-    /// SHA-256 of the blob that it belongs to.
-    blob: [u8; 32],
-    /// White noise of the probes A, B, C, mm.
-    white_mm: [f64; 3],
-    /// Walk of the reference in X, Y, Rz in a second, mm, mm, mrad.
-    drift_mm: [f64; 3],
-    /// Chi-square over residuals.
-    misfit: f64,
-    /// Covariance of the 81 parameters, or of these and k and h of A, B, C: the lower triangle row by row.
-    triangle: Vec<f64>,
-    /// The faults of the log that the calibration is without.
-    repaired: Vec<String>,
-    budget: Option<Budget>,
-    up_to: Option<UpTo>,
-    /// Marks of the logs that the blob was fitted to.
-    marks: Vec<u32>,
-    /// The latest number of a certificate; empty without one.
-    certificate: String,
-}
+/// What the file holds: SHA-256 of the blob that it belongs to; white noise of the probes A, B, C, m, and walk of the reference in
+/// X, Y, Rz in a second, m, m, rad; the lower triangle of the covariance, row by row; all else.
+type Content<K> = ([u8; 32], [[f64; 3]; 2], Vec<f64>, K);
 
 /// Why there is no posterior.
 #[derive(Debug, thiserror::Error)]
@@ -152,24 +129,13 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; 32], runtime::BlobError> {
 /// The file beside a blob.
 pub fn to_bytes(blob: &[u8], known: &StoredPosterior) -> Vec<u8> {
     let StoredPosterior {
-        covariance,
-        noise,
-        misfit,
-        ..
+        covariance, noise, ..
     } = known;
     let rows = 0..covariance.nrows();
-    let content = Content {
-        blob: Sha256::digest(blob).into(),
-        white_mm: noise.white_m.map(|m| m * MM_PER_M),
-        drift_mm: noise.drift.map(|m| m * MM_PER_M),
-        misfit: *misfit,
-        triangle: (rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]))).collect(),
-        repaired: known.repaired.clone(),
-        budget: known.budget.clone(),
-        up_to: known.up_to,
-        marks: known.marks.clone(),
-        certificate: known.certificate.clone(),
-    };
+    let triangle = rows.flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
+    let noise = [noise.white_m, noise.drift];
+    let blob = Sha256::digest(blob).into();
+    let content: Content<&StoredPosterior> = (blob, noise, triangle.collect(), known);
     // Into memory it does not fail.
     let mut bytes = postcard::to_extend(&content, MAGIC.to_vec()).unwrap_or_default();
     bytes.extend(Sha256::digest(&bytes));
@@ -189,8 +155,9 @@ pub fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     if Sha256::digest(&bytes[..MAGIC.len() + content.len()])[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let content: Content = postcard::from_bytes(content).map_err(|error| error.to_string())?;
-    let triangle = &content.triangle;
+    let content = postcard::from_bytes(content).map_err(|error| error.to_string())?;
+    let (blob, noise, triangle, known): Content<StoredPosterior> = content;
+    let [white_m, drift] = noise;
     let has_rows = |rows: &usize| triangle.len() == rows * (rows + 1) / 2;
     let rows = ROWS
         .into_iter()
@@ -200,34 +167,19 @@ pub fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
         let (row, column) = (i.max(j), i.min(j));
         triangle[row * (row + 1) / 2 + column]
     });
-    let Content {
-        white_mm,
-        drift_mm,
-        misfit,
-        budget,
-        ..
-    } = content;
-    let mut noise = [white_mm, drift_mm].concat().into_iter().chain([misfit]);
-    if !noise.all(|x| x >= 0.0 && x.is_finite())
+    let mut figures = noise.as_flattened().iter().chain([&known.misfit]);
+    if !figures.all(|x| *x >= 0.0 && x.is_finite())
         || !is_covariance(&covariance)
-        || !budget.iter().all(Budget::is_finite)
+        || !known.budget.iter().all(Budget::is_finite)
     {
         return Err("its numbers are no noise and no covariance".to_owned());
     }
     let known = StoredPosterior {
         covariance,
-        noise: Noise {
-            white_m: white_mm.map(|mm| mm / MM_PER_M),
-            drift: drift_mm.map(|mm| mm / MM_PER_M),
-        },
-        misfit,
-        repaired: content.repaired,
-        budget,
-        up_to: content.up_to,
-        marks: content.marks,
-        certificate: content.certificate,
+        noise: Noise { white_m, drift },
+        ..known
     };
-    Ok((content.blob, known))
+    Ok((blob, known))
 }
 
 /// Whether a matrix is a covariance. It is scaled to a diagonal of ones first.

@@ -7,6 +7,7 @@ use hallstage_input::dataset::{Dataset, LogSource, Row};
 use hallstage_solver::estimator::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::ParameterSet;
+use serde::{Deserialize, Serialize};
 
 /// Marks of a log.
 const MARKS: usize = 256;
@@ -14,11 +15,13 @@ const MARKS: usize = 256;
 const SHARED_MIN: usize = 8;
 
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredPosterior {
     /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`](hallstage_solver::estimator::posterior::Posterior::covariance).
+    #[serde(skip)]
     pub covariance: DMatrix<f64>,
     /// The noise of the log.
+    #[serde(skip)]
     pub noise: Noise,
     /// Chi-square over residuals of the fit; above 1 where the model is incomplete.
     pub misfit: f64,

@@ -147,7 +147,7 @@ fn service_is_back_at_the_noise_floor() {
         assert!(with_new < after, "{change:?} {run:?}: {with_new}");
         let after = predicted(&new).worst_ratio();
         assert!((with_new - after).abs() < 0.03, "{with_new} {after}");
-        let old = new.predicted_before.expect("a service").worst_ratio();
+        let old = new.predicted_before.worst_ratio();
         assert!((with_old / old - 1.0).abs() < 0.2, "{with_old} {old}");
     }
 }

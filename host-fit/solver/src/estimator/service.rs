@@ -162,10 +162,10 @@ pub struct Comparison {
 }
 
 impl ServiceVariance {
-    /// The variances of the field model with this posterior, and the difference to another model ((31) or an old one), over
+    /// The variances of the field model with this posterior, and the difference to another model, over
     /// X, Y, Rz and Z, Rx, Ry of the largest magnitudes `ranges` (m, rad). Infinite where the
     /// probes do not determine the pose.
-    pub fn new(
+    fn new(
         parameters: &FieldParameters,
         posterior: &Posterior,
         other: &FieldParameters,

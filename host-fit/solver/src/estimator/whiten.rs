@@ -31,7 +31,7 @@ pub const COLUMNS: usize = (LAG_RATE + 2).next_multiple_of(4);
 const OFFSET_M: f64 = 1e-3;
 
 /// Noise of the log.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Noise {
     /// White noise of the probes A, B, C from row to row, standard deviation, m.
     pub white_m: [f64; 3],
