@@ -1,7 +1,6 @@
 //! The rows that a log holds, as arrays.
 
 use host_fit::input::dataset::{Dataset, Row};
-use host_fit::input::log::LogRow;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use runtime::frame::MISSING_CODE;
@@ -40,11 +39,6 @@ impl HeldRows {
             movement: number,
             row: *row,
         });
-    }
-
-    /// Adds the next row as it is read.
-    pub fn take(&mut self, log: usize, row: &LogRow) {
-        self.push(log, row.movement, &row.row);
     }
 
     /// The rows of a dataset.

@@ -36,7 +36,8 @@ impl Log {
     /// decimal commas, units in the header, UTF-16, dates as times; and in the form of `log.save` and `log.df.to_csv`.
     ///
     /// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to count rows with a
-    /// bad cell and go on without them. `rows`: "all", or "sample" to hold the sample that `fit` works on.
+    /// bad cell and go on without them. `rows`: "all", or "sample" to hold, in little memory, the sample that `fit`
+    /// works on.
     ///
     /// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
     /// be read.
@@ -214,7 +215,7 @@ impl Log {
             // A log that is only decoded has no reference.
             let reading = text.read(ReadOptions::SENSORS, watch, |log, row| {
                 if !how.is_sample {
-                    all.take(log, row);
+                    all.push(log, row.movement, &row.row);
                 }
             })?;
             let held = if how.is_sample {

@@ -1,6 +1,6 @@
 //! The text of logs: in files, or in memory.
 
-use host_fit::input::log::layout::{LogLayout, Quantity};
+use host_fit::input::log::layout::{Column, LogLayout, Quantity};
 use host_fit::input::log::table::Table;
 use host_fit::input::log::{self, LogError, LogReading, LogRow, ReadOptions};
 use host_fit::input::stage::{Stage as Designed, TemperatureTable};
@@ -35,8 +35,8 @@ impl Source {
     /// Files in the form that the package writes, or in the form that the stage describes.
     pub fn files(paths: Vec<PathBuf>, stage: &Designed) -> Self {
         let is_own = paths.iter().all(|path| {
-            let text = TextReader::open(path).ok();
-            text.is_some_and(|text| is_own(text, &stage.log))
+            // What a pipe gives can be read once.
+            path.is_file() && TextReader::open(path).is_ok_and(|text| is_own(text, &stage.log))
         });
         Self {
             logs: Logs::Files(paths),
@@ -58,6 +58,10 @@ impl Source {
             return stage.clone();
         }
         let mut log = LogLayout::default();
+        for quantity in [Quantity::HALL, Quantity::GAPS].concat() {
+            let name = quantity.key().to_owned();
+            log.set(quantity, Column { name, scale: 1.0 });
+        }
         // These are no quantities of a layout.
         log.ignored = ["", "log"]
             .into_iter()

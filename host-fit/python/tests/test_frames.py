@@ -82,6 +82,8 @@ def test_a_frame_with_the_columns_of_a_file_is_its_log(run30: hs.Log, stage: hs.
         hs.Log.from_frame(frame, stage)
     assert (raised.value.line, raised.value.name) == (7, "hall_a_cnt")
     assert len(hs.Log.from_frame(frame, stage, bad_rows="skip")) == len(run30) - 1
+    with pytest.raises(hs.LogError, match="the column `hall_c` is missing"):
+        hs.Log.from_frame(run30.df.drop(columns="hall_c"), stage)
     for wrong in [frame[:0], frame.to_numpy(), None]:
         with pytest.raises(ValueError, match="^frame: "):
             hs.Log.from_frame(wrong, stage)
