@@ -2,9 +2,13 @@
 //!
 //! A movement ends there, so that each part has its own zero deviation.
 
-use super::dataset::{Dataset, GAP_PERIODS, Movement, Row};
+use super::channels::runs;
+use super::dataset::{Dataset, Movement, Row};
 use super::stage::Interferometer;
+use std::ops::Range;
 
+/// Resets are rarer than one in this many rows.
+const RARITY: usize = 100;
 /// Rows on either side of a jump.
 const ROWS: usize = 6;
 /// The parabola through every other row on one side, half a row before the first.
@@ -23,18 +27,17 @@ impl Dataset {
     /// Ends movements where beams jump and the probes do not, and returns the first rows of the new movements.
     pub fn split_at_resets(&mut self, interferometer: &Interferometer) -> Vec<usize> {
         let mut resets = Vec::new();
-        for (log, source) in self
-            .logs
-            .iter()
-            .enumerate()
-            .filter(|(_, log)| log.has_reference)
-        {
-            let period_s = self.period_s(source.rows.clone()).unwrap_or(f64::INFINITY);
-            for movement in self.movements.iter().filter(|movement| movement.log == log) {
-                let rows = &self.rows[movement.rows.clone()];
-                let found = in_movement(rows, interferometer, 1e6 * GAP_PERIODS * period_s);
-                resets.extend(found.into_iter().map(|row| movement.rows.start + row));
+        for source in self.logs.iter().filter(|log| log.has_reference) {
+            let run =
+                |run: Range<usize>| source.rows.start + run.start..source.rows.start + run.end;
+            for rows in runs(self, source).into_iter().map(run) {
+                let found = in_run(&self.rows[rows.clone()], interferometer);
+                resets.extend(found.into_iter().map(|row| rows.start + row));
             }
+        }
+        // Values that are held jump again and again.
+        if resets.len() * RARITY > self.rows.len() {
+            return Vec::new();
         }
         for &row in resets.iter().rev() {
             let number = self.rows[row].movement;
@@ -52,8 +55,8 @@ impl Dataset {
     }
 }
 
-/// The first rows after jumps.
-fn in_movement(rows: &[Row], interferometer: &Interferometer, gap_us: f64) -> Vec<usize> {
+/// The first rows after jumps in consecutive rows.
+fn in_run(rows: &[Row], interferometer: &Interferometer) -> Vec<usize> {
     let beams = |row: &Row| row.beams_m(interferometer);
     // The largest jump of a beam at a row, where it is no motion and stays.
     let jump = |here: usize| -> Option<f64> {
@@ -67,12 +70,7 @@ fn in_movement(rows: &[Row], interferometer: &Interferometer, gap_us: f64) -> Ve
         let is_seen = seen_m
             .iter()
             .any(|jump| *jump > f64::max(HALL_PART * most, LEAST_M));
-        let is_even = || {
-            window
-                .windows(2)
-                .all(|two| ((two[1].t_us - two[0].t_us) as f64) < gap_us)
-        };
-        (most > LEAST_M && (0..3).all(stays) && !is_seen && is_even()).then_some(most)
+        (most > LEAST_M && (0..3).all(stays) && !is_seen).then_some(most)
     };
     let all: Vec<Option<f64>> = (0..rows.len()).map(jump).collect();
     let is_largest = |here: &usize| {
@@ -127,6 +125,16 @@ mod tests {
             let rows = &log.rows[movement.rows.clone()];
             assert!(rows.iter().all(|row| row.movement == number), "{number}");
         }
+    }
+
+    #[test]
+    fn values_of_beams_that_are_held_end_no_movement() {
+        let mut held = run();
+        for rows in held.rows.chunks_mut(10) {
+            let first = rows[0].reference;
+            rows.iter_mut().for_each(|row| row.reference = first);
+        }
+        assert!(held.split_at_resets(&stage().interferometer).is_empty());
     }
 
     #[test]
