@@ -1,14 +1,12 @@
 //! Findings about the fit itself.
 
 use crate::fit::Fit;
-use crate::judge::identify::{FitFailure, check_described};
 use crate::judge::predicted::Predicted;
 use crate::judge::statistics;
 use crate::judge::verdict;
 use crate::words;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
-use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 
 /// Movements so short that their zero deviations make the errors too small: each zero deviation fits one row.
@@ -39,32 +37,6 @@ pub(super) fn not_field(fit: &Fit, predicted: Option<&Predicted>) -> Option<Find
     };
     let found = Finding::new(kind).with_severity(Severity::Note);
     (fit.model.kind != ModelKind::Field).then_some(found)
-}
-
-/// A fit that explains too little of the motion and is kept because the user wants it.
-pub(super) fn undescribed(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Option<Finding> {
-    let errors = fit.sound_errors(dataset, stage);
-    let failure = check_described(dataset, &errors, fit.model).err()?;
-    let FitFailure::NotDescribed {
-        model,
-        motion,
-        error_micro,
-        motion_micro,
-    } = failure
-    else {
-        return None;
-    };
-    let kind = Kind::NotDescribed {
-        model,
-        error_micro,
-        motion_micro,
-        unit: motion.micro_unit(),
-    };
-    Some(
-        Finding::new(kind)
-            .with_channel(motion)
-            .with_severity(Severity::Refuse),
-    )
 }
 
 /// rms errors of a fit over their noise from row to row, of the worst axis.

@@ -53,7 +53,7 @@ pub mod temperature;
 mod units;
 
 use crate::budget::Budget;
-use crate::fit::{Estimate, Fit, FitError, FitSettings, ModelChoice, Repair, fit};
+use crate::fit::{Estimate, Fit, FitError, Repair};
 use crate::judge::identify::FitFailure;
 use crate::judge::in_motion::{InMotion, UpTo};
 use crate::judge::predicted::{Predicted, Validity};
@@ -70,10 +70,6 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::terms::COUNT;
 pub use limits::ERROR_TO_NOISE_MAX;
 use runtime::{ModelKind, ParameterSet};
-use std::borrow::Cow;
-
-/// A fit with this many times the errors of the best fit is poor.
-const POOR_MIN: f64 = 1.5;
 
 /// The faults of a log, and the verdict on its calibration.
 #[derive(Clone, Debug, Default)]
@@ -110,23 +106,21 @@ pub fn diagnose_log(
     let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
-    let outliers = fitted.map_or_else(|_| Vec::new(), |fit| fit.fitted.outliers().collect());
-    let without_outliers = match outliers.as_slice() {
-        [] => Cow::Borrowed(dataset),
-        outliers => Cow::Owned(dataset.without(outliers)),
-    };
     let designed = || FieldParameters::from_model_31(&Parameters::designed(stage), stage);
     let own = fitted.map_or_else(|_| designed(), |fit| fit.estimate.parameters);
-    let better = fitted.ok().and_then(|fit| better(fit, dataset, stage));
-    let (best, poor) = better.map_or((own, None), |(best, poor)| (best, Some(poor)));
     let mut out = Diagnosis {
         columns: columns(logged, stage),
         ..Diagnosis::default()
     };
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
+    // A search may end far from the best parameters.
+    let is_near = |fit: &&Fit| {
+        fit.field.is_some() || fit_checks::over_noise(fit, dataset) <= ERROR_TO_NOISE_MAX
+    };
+    let start = fitted.ok().filter(is_near).map_or_else(designed, |_| own);
     let by = Calibrated {
         parameters: &own,
-        start: &best,
+        start: &start,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         floor_m: probe_noise_m(&out.columns),
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
@@ -140,15 +134,14 @@ pub fn diagnose_log(
     };
     let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
     let described = (is_described, estimate);
-    let found = out.add_faults(dataset, &without_outliers, stage, by, described);
-    out.findings.extend(poor);
+    let found = out.add_faults(dataset, stage, by, described);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
         Err(_) => out.predicted = None,
     }
     let short = fit_checks::short_movements(fitted.ok(), dataset);
     out.findings.extend(short);
-    let columns = ColumnFaults::new(&out.columns, logged, stage, &best);
+    let columns = ColumnFaults::new(&out.columns, logged, stage, &start);
     out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.bent));
     out.findings.extend(columns.findings);
     let is_for_service = by.is_for_service;
@@ -173,17 +166,18 @@ pub fn diagnose_log(
         InMotion::new(&motion, parameters, stage, &at_rest?)
     });
     out.up_to = out.motion.map(|motion| motion.up_to);
-    let mut stays = columns.stays;
     let (_, drifts) = found.unwrap_or_default();
-    (0..3).for_each(|axis| stays[axis] += drifts[axis]);
     let late = out
         .findings
         .iter()
         .filter_map(|found| late::in_service(found, stage));
-    late.for_each(|late| (0..3).for_each(|axis| stays[axis] += late[axis]));
+    let motion = out.motion.iter().map(|motion| motion.added);
+    let stays = late.chain(motion).chain([columns.stays, drifts]);
+    let stays = stays.fold([0.0; 3], |sum, of| {
+        [0, 1, 2].map(|axis| sum[axis] + of[axis])
+    });
     if let (Some(motion), Some(at_rest)) = (out.motion, at_rest) {
         out.findings.extend(motion.finding(&at_rest));
-        (0..3).for_each(|axis| stays[axis] += motion.added[axis]);
     }
     out.conclude(stays, basis);
     if let (Some(figures), Ok(fit)) = (field, fitted) {
@@ -203,20 +197,6 @@ pub fn diagnose_log(
     out
 }
 
-/// The parameters that describe the log best by the same model where this fit is poor, because a search has not converged,
-/// and a finding about that. Faults are looked for from there.
-fn better(poor: &Fit, dataset: &Dataset, stage: &Stage) -> Option<(FieldParameters, Finding)> {
-    let over_noise = fit_checks::over_noise(poor, dataset);
-    if poor.field.is_some() || over_noise <= ERROR_TO_NOISE_MAX {
-        return None;
-    }
-    let model = ModelChoice::Named(poor.model);
-    let best_fit = fit(dataset, stage, &FitSettings::new(model)).ok()?;
-    let best = fit_checks::over_noise(&best_fit, best_fit.rows(dataset));
-    let found = Finding::new(Kind::PoorFit { over_noise, best });
-    (POOR_MIN * best < over_noise).then_some((best_fit.estimate.parameters, found))
-}
-
 /// Whether the rows of a finding are left out of a repair.
 const fn stands(found: &Finding) -> bool {
     matches!(found.code(), Code::Stuck | Code::Saturated)
@@ -228,7 +208,6 @@ impl Diagnosis {
     fn add_faults(
         &mut self,
         dataset: &Dataset,
-        without_outliers: &Dataset,
         stage: &Stage,
         by: Calibrated,
         (is_described, estimate): (bool, Option<&Estimate>),
@@ -237,8 +216,9 @@ impl Diagnosis {
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
-        let rows = has_channels.then(|| find_faults(&dataset.without(&bad), stage, by, is_bent));
-        let of_rows = rows.flatten();
+        let sound = &dataset.without(&bad);
+        let of_rows = has_channels.then(|| find_faults(sound, stage, by, is_bent));
+        let of_rows = of_rows.flatten();
         // A repair that leads to residuals of noise explains the log, but not a drawing that it contradicts.
         let explains = |of: &&Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
         let repaired = of_rows
@@ -256,7 +236,7 @@ impl Diagnosis {
             (None, Some(own)) if !is_bent => Some((&own.parameters, &own.posterior.covariance)),
             _ => None,
         };
-        let mistake = structure::structure(without_outliers, stage, disagree, known);
+        let mistake = structure::structure(sound, stage, disagree, known);
         let stands_alone = |found: &Finding| {
             repaired.is_none() || matches!(found.kind, Kind::Mistake { is_sure: true, .. })
         };
@@ -287,16 +267,13 @@ impl Diagnosis {
         let predicted = self.predicted.as_ref();
         let late = late::late_reference(fit, self.repair.as_ref(), findings, stage, predicted);
         findings.extend(late);
-        findings.extend(temperature::findings(fit, dataset, stage));
+        findings.extend(temperature::findings(fit, dataset, stage, predicted));
         findings.extend(range::undeclared(fit, stage));
         let explains = |found: &Finding| {
             found.severity >= Severity::Refuse
                 || found.code().entry().explains_from == Some(Severity::Note)
         };
         if !findings.iter().any(explains) {
-            if self.repair.is_none() {
-                findings.extend(fit_checks::undescribed(fit, dataset, stage));
-            }
             findings.extend(fit_checks::not_field(fit, self.predicted.as_ref()));
         }
     }
@@ -362,7 +339,7 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    out.add_faults(dataset, dataset, stage, by, (true, None));
+    out.add_faults(dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     out.findings

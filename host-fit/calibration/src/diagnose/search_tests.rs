@@ -3,7 +3,7 @@
 use super::diagnose_log;
 use crate::fit::{FitSettings, ModelChoice, fit};
 use crate::judge::verdict::Verdict;
-use hallstage_input::finding::{Code, Finding, Kind};
+use hallstage_input::finding::{Code, Finding};
 use hallstage_input::log::{ReadOptions, read_bytes};
 use hallstage_input::shipped::{LOG_GZ, stage};
 use hallstage_solver::estimator::draw::Draw;
@@ -31,8 +31,6 @@ fn the_signals_of_a_log_are_not_judged_by_a_poor_fit() {
         let fitted = fit(&dataset, &stage, &settings);
         let diagnosis = diagnose_log(&dataset, &stage, fitted.as_ref());
         let mut findings = diagnosis.findings.iter();
-        let is_poor = |found: &Finding| matches!(found.kind, Kind::PoorFit { .. });
-        assert!(findings.clone().any(is_poor), "{seed}: {diagnosis:#?}");
         let is_of_fit = |found: &Finding| {
             let codes = [
                 Code::ModelLacks,

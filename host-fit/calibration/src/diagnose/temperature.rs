@@ -4,8 +4,7 @@
 use super::limits::{RARITY, UNDECIDED};
 use super::units;
 use crate::fit::Fit;
-use crate::judge::predicted::{cost, declared_service};
-use crate::judge::statistics::white_noise;
+use crate::judge::predicted::{Predicted, declared_service};
 use crate::judge::verdict::severity;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Kind, Severity};
@@ -26,7 +25,12 @@ const MISSING_MAX: f64 = 0.01;
 
 /// The fitted k and h, a finding for each sensor. The cost is the error in service from the drift of the temperature in
 /// the log and the uncertainty of k and h.
-pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+pub(super) fn findings(
+    fit: &Fit,
+    dataset: &Dataset,
+    stage: &Stage,
+    predicted: Option<&Predicted>,
+) -> Vec<Finding> {
     let temperature = &fit.calibration.temperature;
     let parameters = fit.estimate.parameters;
     let (error_per_k, spans_k) = match &fit.field {
@@ -40,7 +44,6 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
             ([expected; 3], [0.0; 2])
         }
     };
-    let floor = white_noise(&fit.decoded.errors, &dataset.movements);
     let cost_of = |sensor: usize| {
         let mut covariance = DMatrix::zeros(Coefficient::ROWS, Coefficient::ROWS);
         for (probe, errors) in error_per_k.iter().enumerate() {
@@ -50,8 +53,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
         let changes_k = [drift_k(dataset, temperature, sensor); 2];
         let changes = covariance_at(&covariance, &parameters, changes_k);
         let service = declared_service(stage, &parameters, [0.0; 3])?.variance(&changes);
-        let ratio = cost(service.systematic, floor.map(|rms| rms * rms));
-        Some(ratio).filter(|ratio| ratio.is_finite())
+        Some(predicted?.cost_of(service.systematic))
     };
     let there = (0..2).filter(|sensor| temperature.reach_mk[*sensor] != 0);
     let finding = |sensor: usize| {

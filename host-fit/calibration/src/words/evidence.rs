@@ -106,13 +106,6 @@ pub(super) fn evidence(found: &Finding) -> String {
             });
             format!("{reason}{service}")
         }
-        Kind::PoorFit { over_noise, best } => {
-            format!("the search ended far from the best fit: its errors are {over_noise:.1} times the noise from row to row, the errors of least squares {best:.1} times")
-        }
-        Kind::NotDescribed { model, error_micro, motion_micro, unit } => {
-            let unit = sign(unit);
-            format!("the fitted model ({model}) does not describe the log: its errors are {error_micro:.1} {unit} rms in {on}, the motion itself has {motion_micro:.1} {unit} rms")
-        }
         Kind::ZerosClipped { movements, of, largest_um } => {
             format!("the zero deviation of {movements} of {} is beyond its range (largest {largest_um:.1} µm)", counted(*of, "movement"))
         }

@@ -76,8 +76,6 @@ pub fn remedy(found: &Finding) -> String {
         Kind::FaultsTogether { .. } => "see the other findings, and record the log again",
         Kind::OtherProbes { .. } => "check order and signs of all channels, the scales and the designed values in stage.toml",
         Kind::ShortMovements { .. } => "check the times and the movement column; a log without this column begins a movement after every gap of more than ten rows",
-        Kind::PoorFit { .. } => "let the search run longer, or take the default solver",
-        Kind::NotDescribed { .. } => "check the columns, the order and signs of the sensors, and the scales in stage.toml",
         Kind::LateReference { is_declared: true, .. } => "set the delay of the probes to that of the reference, or declare a slower service in [motion]",
         Kind::LateReference { .. } => "declare the latency of the reference, latency_us in [interferometer] of stage.toml: the rest of the lag then counts as one of the probes. Or judge the poses in motion by another reference",
         Kind::AtLimit { .. } => "check the scales and signs of that probe and of the beams; if they are right, widen the range in stage.toml",

@@ -207,10 +207,6 @@ kinds! {
     ShortMovements { mean_rows: f64, hidden_percent: f64 } => Code::ShortMovements, *mean_rows, "rows";
     /// The model is not the field model. Ranges of the errors in service of X, Y, Rz.
     OtherModel { reason: String, in_service_micro: Option<[[f64; 2]; 3]> } => Code::ModelLacks;
-    /// A search ended far from the best description of the log; errors over their noise from row to row.
-    PoorFit { over_noise: f64, best: f64 } => Code::ModelLacks, *over_noise, "times";
-    /// The model does not describe the motion; rms of the errors and of the motion along an axis.
-    NotDescribed { model: &'static str, error_micro: f64, motion_micro: f64, unit: &'static str } => Code::ModelLacks;
     /// Zero deviations beyond their range.
     ZerosClipped { movements: usize, of: usize, largest_um: f64 } => Code::ZeroClipped, *movements as f64, "movements";
     /// Rows that the decoder refuses.
