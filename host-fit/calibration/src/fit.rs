@@ -35,7 +35,6 @@ pub(crate) use calibration::RANGE_MARGIN;
 pub use calibration::calibration;
 pub use error::FitError;
 pub use estimate::Estimate;
-pub(crate) use lag::with_beams_later;
 pub use repair::Repair;
 pub use rows::FittedRows;
 pub use settings::{FitSettings, ModelChoice};

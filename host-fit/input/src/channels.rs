@@ -40,6 +40,8 @@ const FALL_OF_PROBE: f64 = 0.45;
 const FALLS_OF_BEAM: [f64; 2] = [3.0, 1.0];
 /// The noise of a beam is the noise of its reading, and no motion, below this part of the noise of a probe.
 const QUIET: f64 = 1.0 / 200.0;
+/// The noise of a probe where its readings do not show it, m.
+pub const USUAL_NOISE_M: f64 = 5e-7;
 /// The channels of the probes A, B, C.
 pub const PROBES: [Channel; 3] = [Channel::HallA, Channel::HallB, Channel::HallC];
 /// A probe or a gap is noisy from this many times the noise of its siblings: in sound logs a probe has at most 1.14 times

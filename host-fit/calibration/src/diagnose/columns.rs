@@ -5,7 +5,7 @@ use super::slopes::Slopes;
 use crate::judge::predicted::{cost, declared_service, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, probe_noise_m};
+use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, USUAL_NOISE_M, probe_noise_m};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -47,7 +47,7 @@ impl ColumnFaults {
         stage: &Stage,
         parameters: &FieldParameters,
     ) -> Self {
-        let probes_m = probe_noise_m(columns).unwrap_or([stage.hall.m_per_count; 3]);
+        let probes_m = probe_noise_m(columns).unwrap_or([USUAL_NOISE_M; 3]);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
         let service = declared_service(stage, parameters, probes_m);
         let effects = service.map(|service| PoseEffects::new(&service, stage, parameters));
@@ -57,66 +57,60 @@ impl ColumnFaults {
             false => 0.0,
         });
         let cost = |own: [f64; 3]| cost(own, floor);
+        let none = [0.0; 3];
         let mut out = Self {
             findings: Vec::new(),
-            bent: [0.0; 3],
-            stays: [0.0; 3],
+            bent: none,
+            stays: none,
+        };
+        // A finding, and its variances: by a bent calibration, and of sensors in service.
+        let with_effect = |column: &Column, (kind, effect): (Kind, Effect)| {
+            let found = Finding::new(kind).with_channel(column.channel);
+            let (own, part, worst) = match effect {
+                // A calibration is right though a sensor is not.
+                Effect::Stays(m2, counted_m2) => {
+                    let own = effects.variances(&[column.channel], |_, _| m2);
+                    (own, 1.0 - counted_m2 / m2, Severity::Warn)
+                }
+                Effect::Bent(m) => {
+                    let part = (BENDS * m / noise_m).powi(2);
+                    (floor.map(|of| of * part), 0.0, Severity::Refuse)
+                }
+                Effect::Unknown => return (found, none, none),
+            };
+            let found = found.with_severity(severity(cost(own)).min(worst));
+            let is_bent = f64::from(u8::from(worst == Severity::Refuse));
+            let parts = [is_bent, part].map(|part| own.map(|of| of * part));
+            (found.with_cost(cost(own)), parts[0], parts[1])
         };
         for (log, source) in dataset.logs.iter().enumerate() {
             let own: Vec<&Column> = columns.iter().filter(|column| column.log == log).collect();
-            let mut stays = [0.0; 3];
+            let mut stays = none;
             for kind in own.chunks(3) {
                 let before = out.findings.len();
                 for column in kind {
                     let faults = faults(column, noise_m, source.rows.len());
-                    let with_effect = |(kind, effect): (Kind, Effect)| {
-                        let found = Finding::new(kind).with_channel(column.channel);
-                        let own = match effect {
-                            Effect::Stays(m2, _) => effects.variances(&[column.channel], |_, _| m2),
-                            Effect::Bent(m) => floor.map(|of| of * (BENDS * m / noise_m).powi(2)),
-                            Effect::Unknown => return (found, effect, [0.0; 3]),
-                        };
-                        let (cost, is_bent) = (cost(own), matches!(effect, Effect::Bent(_)));
-                        // A calibration is right though a sensor is not.
-                        let worst = if is_bent {
-                            Severity::Refuse
-                        } else {
-                            Severity::Warn
-                        };
-                        let severity = severity(cost).min(worst);
-                        (found.with_severity(severity).with_cost(cost), effect, own)
-                    };
                     // Harmless properties are in the table of channels only.
-                    let mut felt = faults.map(with_effect);
+                    let mut felt = faults.map(|fault| with_effect(column, fault));
                     let felt = felt.find(|(found, ..)| found.severity > Severity::Note);
-                    let Some((found, effect, own)) = felt else {
+                    let Some((mut found, bent, own)) = felt else {
                         continue;
                     };
-                    let first = column
-                        .outliers
-                        .first()
-                        .filter(|_| found.code() == Code::Outliers);
-                    out.findings.push(match first {
-                        Some((row, _)) => {
-                            let row = &dataset.rows[source.rows.start + row];
-                            let movement = &dataset.movements[row.movement];
-                            found.with_place(dataset.movement_name(movement), row.t_us)
-                        }
-                        None => found,
-                    });
-                    match effect {
-                        Effect::Stays(m2, counted_m2) => {
-                            let part = 1.0 - counted_m2 / m2;
-                            add(&mut stays, own.map(|own| own * part));
-                        }
-                        // The beams are slow together.
-                        Effect::Bent(_) => most(&mut out.bent, own),
-                        Effect::Unknown => {}
+                    if let (Code::Outliers, Some((row, _))) =
+                        (found.code(), column.outliers.first())
+                    {
+                        let row = &dataset.rows[source.rows.start + row];
+                        let movement = &dataset.movements[row.movement];
+                        found = found.with_place(dataset.movement_name(movement), row.t_us);
                     }
+                    out.findings.push(found);
+                    stays = both(stays, own, |a, b| a + b);
+                    // The beams are slow together.
+                    out.bent = both(out.bent, bent, f64::max);
                 }
                 let channels: Vec<Channel> = kind.iter().map(|column| column.channel).collect();
                 let beyond = effects.variances(&channels, |i, j| kind[i].beyond_m2[j]);
-                add(&mut stays, beyond);
+                stays = both(stays, beyond, |a, b| a + b);
                 let shared = kind.iter().map(|column| column.shared).fold(0.0, f64::max);
                 let is_new = shared > 0.0 || out.findings.len() == before;
                 if severity(cost(beyond)) > Severity::Note && is_new {
@@ -131,20 +125,14 @@ impl ColumnFaults {
                 }
             }
             // Service has the sensors of one log.
-            most(&mut out.stays, stays);
+            out.stays = both(out.stays, stays, f64::max);
         }
         out
     }
 }
 
-fn add(all: &mut [f64; 3], own: [f64; 3]) {
-    all.iter_mut().zip(own).for_each(|(all, own)| *all += own);
-}
-
-fn most(all: &mut [f64; 3], own: [f64; 3]) {
-    all.iter_mut()
-        .zip(own)
-        .for_each(|(all, own)| *all = own.max(*all));
+fn both(a: [f64; 3], b: [f64; 3], of: fn(f64, f64) -> f64) -> [f64; 3] {
+    [0, 1, 2].map(|axis| of(a[axis], b[axis]))
 }
 
 /// By pose of service and channel: the errors of X, Y, Rz by an error of the channel; none for beams, which service does not

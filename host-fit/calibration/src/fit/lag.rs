@@ -66,7 +66,7 @@ fn again(
             break;
         }
         total_s += lag.value_s;
-        let later = with_beams_later(dataset, stage, [total_s; 3]);
+        let later = with_beams_later(dataset, stage, total_s);
         found = fit_once(&later, stage, settings)?;
         found.later = Some(later);
     }
@@ -78,7 +78,7 @@ fn again(
 
 /// The rows with the beams X, Y1, Y2 of `later_s` after them, interpolated between their neighbours (cubic);
 /// rows that lack neighbours, at the ends of a movement and beside gaps, are left out.
-pub(crate) fn with_beams_later(dataset: &Dataset, stage: &Stage, later_s: [f64; 3]) -> Dataset {
+fn with_beams_later(dataset: &Dataset, stage: &Stage, later_s: f64) -> Dataset {
     let mut out = Dataset {
         rows: Vec::with_capacity(dataset.rows.len()),
         movements: Vec::new(),
@@ -94,7 +94,7 @@ pub(crate) fn with_beams_later(dataset: &Dataset, stage: &Stage, later_s: [f64; 
         let beams_m: Vec<[f64; 3]> = rows.iter().map(beams_m).collect();
         for row in rows {
             let later = |beam: usize| {
-                let t_us = row.t_us as f64 + later_s[beam] * 1e6;
+                let t_us = row.t_us as f64 + later_s * 1e6;
                 let next = rows.partition_point(|row| row.t_us as f64 <= t_us);
                 let four = next.checked_sub(2)?..next + 2;
                 let of_beam = beams_m
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn the_reference_is_read_later_by_the_lag_and_never_across_a_gap() {
         for (lag_s, left) in [(1.3e-3, 7), (4.6e-3, 6), (-2.7e-3, 7)] {
-            let after = with_beams_later(&dataset(lag_s), &stage(), [lag_s; 3]);
+            let after = with_beams_later(&dataset(lag_s), &stage(), lag_s);
             for row in &after.rows {
                 for (found, wanted) in row.reference.iter().zip(row.signal_m) {
                     assert!((found - wanted).abs() < 1e-15, "{found} {wanted}");

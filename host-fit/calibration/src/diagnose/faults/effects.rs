@@ -49,37 +49,33 @@ pub(super) struct Suspect {
 /// the beams share a laser and a filter. The common lag of the beams is an unknown of the fit. It equals minus the lag of all Hall
 /// probes, so neither is listed. The suspects of a channel stand together.
 pub(super) fn suspects(with_motion: bool) -> impl Iterator<Item = Suspect> {
-    let some = |follows, first, count| Suspect {
+    use Follows::{Gain, Heat, OwnAcceleration, OwnSpeed, Sag, Turning};
+    let of_channel = |first: usize| {
+        Follows::of_channel(first).map(move |follows| Suspect {
+            follows,
+            first,
+            count: 1,
+        })
+    };
+    let gains = [(Gain, 0), (Gain, 3), (Gain, 6)];
+    let times = [(OwnSpeed, 3), (OwnSpeed, 6)];
+    let motion = [(OwnAcceleration, 3), (Turning, 3), (Sag, 0), (Heat, 0)];
+    let groups = gains.into_iter().chain(times).chain(motion);
+    let groups = groups.map(|(follows, first)| Suspect {
         follows,
         first,
-        count,
-    };
-    let gains = [0, 3, 6].map(|first| some(Follows::Gain, first, 3));
-    let times = [3, 6].map(|first| some(Follows::OwnSpeed, first, 3));
-    let of_channel = move |channel: usize| {
-        let motion = Follows::motion_of(channel).filter(move |_| with_motion);
-        let changes = [Follows::Gain, Follows::Zero, Follows::OwnSpeed].into_iter();
-        changes
-            .chain(motion)
-            .map(move |follows| some(follows, channel, 1))
-    };
-    let motion = [
-        some(Follows::OwnAcceleration, 3, 3),
-        some(Follows::Turning, 3, 3),
-        some(Follows::Sag, 0, 3),
-        some(Follows::Heat, 0, 3),
-    ];
-    let motion = motion.into_iter().filter(move |_| with_motion);
-    let groups = gains.into_iter().chain(times).chain(motion);
-    (0..9).flat_map(of_channel).chain(groups)
+        count: 3,
+    });
+    let all = (0..9).flat_map(of_channel).chain(groups);
+    all.filter(move |suspect| with_motion || suspect.quantity().is_some())
 }
 
 impl Suspect {
     /// The time of a channel.
-    pub(super) const fn late(channel: usize) -> Self {
+    pub(super) const fn late(first: usize) -> Self {
         Self {
             follows: Follows::OwnSpeed,
-            first: channel,
+            first,
             count: 1,
         }
     }

@@ -141,19 +141,6 @@ impl Estimate {
         Self::descend(means, places, self.at.clone(), self.noise, faults)
     }
 
-    /// Lags of the beams X, Y1, Y2, s. The first faults are the lags of Y1 and Y2 behind X, ms. A lag is 0 where its square
-    /// is less than `likely` times its variance.
-    pub(super) fn lags_s(&self, likely: f64) -> [f64; 3] {
-        let covariance = self.curvature.inverse();
-        let sure_s = |(k, unit_s): (usize, f64)| {
-            let value = self.at.values[k];
-            let is_sure = value * value > likely * covariance[(k, k)];
-            if is_sure { unit_s * value } else { 0.0 }
-        };
-        let [x, y1, y2] = [(LAG, 1.0), (UNKNOWNS, 1e-3), (UNKNOWNS + 1, 1e-3)].map(sure_s);
-        [x, x + y1, x + y2]
-    }
-
     /// The lag of the reference, s.
     pub(super) fn lag_s(&self) -> f64 {
         self.at.values[LAG]
@@ -180,20 +167,34 @@ impl Estimate {
     }
 
     /// The covariance of all unknowns. Where terms are larger than usual, also the others are, and their prior pulls
-    /// them to zero: squares over the number of terms that the log determines show how much (MacKay 1992).
+    /// them to zero.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         let own = self.curvature.inverse();
         let mut prior = DMatrix::zeros(own.nrows(), own.nrows());
-        let (mut squares, mut count) = (0.0, 0.0);
-        for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
-            prior[(k, k)] = self.prior[(k, k)];
-            squares += self.prior[(k, k)] * self.at.values[k] * self.at.values[k];
-            count += 1.0 - self.prior[(k, k)] * own[(k, k)];
-        }
+        let terms = || (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31);
+        terms().for_each(|k| prior[(k, k)] = self.prior[(k, k)]);
         // A fault that is not found bends terms, too: harsh magnets fill their prior, no more.
-        let part = (squares / count.max(1.0)).clamp(USUAL_PART * USUAL_PART, 1.0);
-        let over_usual = part / (USUAL_PART * USUAL_PART);
+        let part = self.size_of(terms(), &self.at.values, &own, 1.0);
+        let over_usual = part.clamp(USUAL_PART, 1.0).powi(2) / (USUAL_PART * USUAL_PART);
         &own + &own * (prior * (over_usual - 1.0)) * &own
+    }
+
+    /// The size of terms in parts of their prior: squares over the number of them that the log determines (MacKay
+    /// 1992), with this part of the prior.
+    fn size_of(
+        &self,
+        terms: impl Iterator<Item = usize>,
+        values: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        part: f64,
+    ) -> f64 {
+        let (mut squares, mut count) = (0.0, 0.0);
+        for k in terms {
+            let prior = self.prior[(k, k)];
+            squares += prior * values[k] * values[k];
+            count += 1.0 - prior * covariance[(k, k)] / (part * part);
+        }
+        (squares / f64::max(count, 1e-9)).sqrt()
     }
 
     /// The curvature of a fit without faults, with the first `free` parameters of each probe.
@@ -230,13 +231,9 @@ impl Estimate {
             let factor = Factor::new(&squares, 0.0)?;
             let values = &self.at.values + factor.solve(&change);
             let covariance = factor.inverse();
-            // Squares over the number of terms that the log determines (MacKay 1992).
-            let sum =
-                |of: &dyn Fn(usize) -> f64| -> f64 { (0..COUNT).filter(is_even).map(of).sum() };
-            let squares = sum(&|k| self.prior[(k, k)] * values[k] * values[k]);
-            let by_prior = |k| self.prior[(k, k)] * covariance[(k, k)] / (imperfect * imperfect);
-            let count = sum(&|k| 1.0 - by_prior(k)).max(1e-9);
-            imperfect = (squares / count).sqrt().clamp(EVEN_LEAST, 1.0);
+            let even = (0..COUNT).filter(is_even);
+            let size = self.size_of(even, &values, &covariance, imperfect);
+            imperfect = size.clamp(EVEN_LEAST, 1.0);
             found = Some((values, covariance));
         }
         found

@@ -30,13 +30,13 @@ mod time_tests;
 #[cfg(test)]
 mod unexplained_tests;
 
-use super::limits::ROUNDS;
-use crate::fit::{Repair, with_beams_later};
+use crate::fit::Repair;
 use crate::judge::predicted::{Predicted, declared_service};
 use crate::judge::verdict::LIMITED_MAX;
 use effects::{Effects, Shape, Suspect};
 use estimate::Estimate;
 use findings::not_determined;
+use hallstage_input::channels::USUAL_NOISE_M;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::stage::Stage;
@@ -48,12 +48,9 @@ use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
 use means::Means;
 use runtime::ModelKind;
 use score::{Fault, Split, split};
-use std::borrow::Cow;
 
 /// Maximum number of faults of one log.
 const FAULTS_MAX: usize = 11;
-/// A lag beyond this part of a servo period is taken off before other faults are looked for.
-const LAG_MAX: f64 = 0.5;
 /// The faults of a log.
 #[derive(Debug, Default)]
 pub struct Faults {
@@ -100,45 +97,29 @@ pub fn find_faults(
     calibrated: Calibrated,
     is_bent: bool,
 ) -> Option<Faults> {
-    let mut start = *calibrated.start;
-    let mut finder = Finder {
-        dataset: Cow::Borrowed(dataset),
+    let start = calibrated.start;
+    let finder = Finder {
+        dataset,
         stage,
         calibrated,
         is_bent,
-        means: Means::new(dataset, stage, &start, calibrated.shows_acceleration),
-        lags_s: [0.0; 3],
+        means: Means::new(dataset, stage, start, calibrated.shows_acceleration),
     };
-    let mut rounds = 0..ROUNDS;
-    let first = loop {
-        let effects = Effects::new(&finder.means, stage, &start, 0.0);
-        // Probes may be late, too.
-        let late = [4, 5, 0, 1].map(Suspect::late);
-        let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
-        let first = Estimate::first(&finder.means, &start, &late)?;
-        let beyond_s = first.lags_s(finder.means.per_fault(true, true));
-        if !beyond_s.iter().any(|lag_s| finder.is_lag(*lag_s)) || rounds.next().is_none() {
-            break first;
-        }
-        // A lag is not linear.
-        (0..3).for_each(|beam| finder.lags_s[beam] += beyond_s[beam]);
-        let later = with_beams_later(dataset, stage, finder.lags_s);
-        start = first.parameters;
-        finder.means = Means::new(&later, stage, &start, calibrated.shows_acceleration);
-        finder.dataset = Cow::Owned(later);
-    };
+    let effects = Effects::new(&finder.means, stage, start, 0.0);
+    // Probes and beams may be late, and a lag is no noise.
+    let late = [4, 5, 0, 1].map(Suspect::late);
+    let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
+    let first = Estimate::first(&finder.means, start, &late)?;
     finder.faults(&first.faultless(&finder.means)?)
 }
 
 /// A log with the calibration that it is judged by.
 struct Finder<'a> {
-    dataset: Cow<'a, Dataset>,
+    dataset: &'a Dataset,
     stage: &'a Stage,
     calibrated: Calibrated<'a>,
     is_bent: bool,
     means: Means,
-    /// Lags of the beams X, Y1, Y2, including lags that are already taken off the rows, s.
-    lags_s: [f64; 3],
 }
 
 impl Finder<'_> {
@@ -147,10 +128,6 @@ impl Finder<'_> {
     fn gain(&self, from: f64, to: f64) -> f64 {
         let freedom = self.means.freedom();
         freedom * libm::log(from / to.max(freedom))
-    }
-
-    fn is_lag(&self, lag_s: f64) -> bool {
-        lag_s.abs() > LAG_MAX * self.stage.servo_period_s
     }
 
     fn effects(&self, estimate: &Estimate) -> Effects<'_> {
@@ -177,29 +154,52 @@ impl Finder<'_> {
 
     fn faults(&self, faultless: &Estimate) -> Option<Faults> {
         let by = self.calibrated;
-        let white_m = self.means.white_m;
-        let floor_m = by.floor_m.unwrap_or(white_m);
-        // A filter may hide the noise of one probe.
-        let most_m = white_m.into_iter().fold(0.0, f64::max);
-        let floor_m = floor_m.map(|floor_m| floor_m.min(most_m));
+        let most_m = self.means.white_m.into_iter().fold(0.0, f64::max);
+        let floor_m = match by.floor_m {
+            Some(floor_m) => floor_m.map(|floor_m| floor_m.min(most_m)),
+            // Filters may hide the noise of all probes.
+            None => [USUAL_NOISE_M; 3],
+        };
         let declared = declared_service(self.stage, by.parameters, floor_m)?;
         let own = self.own_curvature(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;
         // A log that does not determine the calibration shows no fault. Other models are for other service.
         let decides = is_open && (by.model != ModelKind::Field || by.is_for_service);
-        let (faults, last) = match decides {
-            true => (Vec::new(), None),
-            false => self.search(faultless),
+        let alone = |finding: Finding, predicted: Predicted| Faults {
+            findings: vec![finding],
+            predicted: Some(predicted),
+            ..Faults::default()
         };
+        if decides && !by.is_fitted {
+            // That is no fault of parameters from another log.
+            return Some(Faults::default());
+        } else if decides {
+            let (predicted, _) = self.expected(faultless, &declared, 1.0)?;
+            return Some(alone(not_determined(&predicted), predicted));
+        }
+        let (faults, last) = self.search(faultless);
         let estimate = last.as_ref().unwrap_or(faultless);
-        let residual = (estimate.chi_squared / self.means.freedom()).sqrt();
-        // Two stages are a fault with a known onset that explain more than all faults.
-        let gain = |to: f64, penalty: f64| self.gain(faultless.chi_squared, to) - penalty;
-        let by_faults: f64 = (0..faults.len())
-            .map(|number| self.needs(&faults[number], &faults[..number]))
-            .sum();
-        let by_faults = gain(estimate.chi_squared, by_faults).max(0.0);
+        let mut out = match self.other_part(faultless, &faults, estimate.chi_squared) {
+            Some(Split { from, off, .. }) => {
+                let whole = faultless.curvature.inverse();
+                let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
+                alone(self.other_state(from, predicted.worst_ratio()), predicted)
+            }
+            None => self.priced(&faults, (faultless, estimate), &declared)?,
+        };
+        if is_open {
+            let open = not_determined(&own).with_severity(Severity::Warn);
+            out.findings.insert(0, open);
+        }
+        Some(out)
+    }
+
+    /// Two stages are a fault with a known onset that explain more than all faults, which leave this chi-square.
+    fn other_part(&self, faultless: &Estimate, faults: &[Fault], left: f64) -> Option<Split> {
+        let gain = |to: f64| self.gain(faultless.chi_squared, to);
+        let needs = (0..faults.len()).map(|number| self.needs(&faults[number], &faults[..number]));
+        let by_faults = (gain(left) - needs.sum::<f64>()).max(0.0);
         let penalty = COUNT as f64 * self.means.per_unknown();
         let onsets = faults.iter().filter_map(|fault| fault.shape.onset());
         // Logs may be of two stages.
@@ -209,35 +209,7 @@ impl Finder<'_> {
         };
         let starts = (1..self.means.first.len()).filter(|at| log(at) != log(&(at - 1)));
         let other = split(faultless, onsets.chain(starts));
-        let other =
-            other.filter(|other| gain(faultless.chi_squared - other.gain, penalty) > by_faults);
-        let alone = |finding: Finding, predicted: Predicted| Faults {
-            findings: vec![finding],
-            predicted: Some(predicted),
-            residual,
-            ..Faults::default()
-        };
-        let mut out = if decides && !by.is_fitted {
-            // That is no fault of parameters from another log.
-            Faults {
-                residual,
-                ..Faults::default()
-            }
-        } else if decides {
-            let (predicted, _) = self.expected(faultless, &declared, 1.0)?;
-            alone(not_determined(&predicted), predicted)
-        } else if let Some(Split { from, off, .. }) = other {
-            let whole = faultless.curvature.inverse();
-            let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
-            alone(self.other_state(from, predicted.worst_ratio()), predicted)
-        } else {
-            self.priced(&faults, (faultless, estimate), &declared, residual)?
-        };
-        if is_open && !decides {
-            let open = not_determined(&own).with_severity(Severity::Warn);
-            out.findings.insert(0, open);
-        }
-        Some(out)
+        other.filter(|other| gain(faultless.chi_squared - other.gain) - penalty > by_faults)
     }
 
     /// The errors of the calibration in service: its distance from the estimate, and the covariance of the estimate

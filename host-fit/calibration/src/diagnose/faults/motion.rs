@@ -57,14 +57,16 @@ pub(super) enum Follows {
 }
 
 impl Follows {
-    /// The motion that an error of one of the nine channels may follow. A late channel is looked for by its time.
-    pub(super) fn motion_of(channel: usize) -> impl Iterator<Item = Self> {
+    /// What an error of one of the nine channels may follow.
+    pub(super) fn of_channel(channel: usize) -> impl Iterator<Item = Self> {
+        let changes = [Self::Gain, Self::Zero, Self::OwnSpeed];
         let speeds = (0..6).map(Self::Speed).chain([Self::Turning]);
         let accelerations = (0..6).map(Self::Acceleration).filter(move |_| channel < 3);
         let forms = [Self::Power(2), Self::Power(3), Self::Side];
         let heights = (0..3).map(Self::Height);
         let (is_beam, is_gap) = ((3..6).contains(&channel), channel > 5);
-        speeds
+        (changes.into_iter())
+            .chain(speeds)
             .chain(accelerations)
             .chain(is_beam.then_some(Self::OwnAcceleration))
             .chain(forms.into_iter().filter(move |_| !is_beam))

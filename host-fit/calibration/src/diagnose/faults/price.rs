@@ -1,6 +1,5 @@
 //! The cost of the faults in service, and the calibration without them.
 
-use super::effects::{Shape, Suspect};
 use super::estimate::Estimate;
 use super::motion::{Follows, squares_at_work};
 use super::score::Fault;
@@ -22,13 +21,6 @@ use runtime::ModelKind;
 const REPAIRS_MAX: usize = 2;
 /// A fault below this cost, errors in service over the noise floor, is not reported.
 const COST_MIN: f64 = 1.01;
-
-/// The distance of each value from the middle one.
-fn off_middle(values: [f64; 3]) -> [f64; 3] {
-    let mut sorted = values;
-    sorted.sort_by(f64::total_cmp);
-    values.map(|x| x - sorted[1])
-}
 
 /// What stays wrong in service.
 struct Stays {
@@ -90,9 +82,9 @@ impl Finder<'_> {
         faults: &[Fault],
         (faultless, estimate): (&Estimate, &Estimate),
         declared: &Service,
-        residual: f64,
     ) -> Option<Faults> {
         let by = self.calibrated;
+        let residual = (estimate.chi_squared / self.means.freedom()).sqrt();
         // Residuals that no fault explains make the parameters less certain.
         let inflation = residual.max(1.0).powi(2);
         let covariance = estimate.covariance() * inflation;
@@ -135,41 +127,34 @@ impl Finder<'_> {
         let own_cost = predicted.worst_ratio();
         let is_felt = |cost: f64| severity(cost) > Severity::Note;
         let (mut is_worth_it, mut is_clear) = (is_felt(own_cost), by.is_fitted);
-        let (mut findings, mut channels, mut changes) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut lags_s, mut by_motion) = (self.lags_s, DVector::zeros(UNKNOWNS));
-        // The changes by event, with their sizes and what they add to the gradient.
-        let mut events: Vec<(Vec<&Fault>, f64, DVector<f64>)> = Vec::new();
-        for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
-            let gradient = estimate.gradient(number) * *size;
-            if fault.suspect.quantity().is_none() {
-                by_motion += gradient;
-                continue;
-            }
-            changes.push(fault.clone());
-            match events
-                .iter_mut()
-                .find(|(others, ..)| is_one_event(others[0], fault))
-            {
-                Some((others, largest, sum)) => {
-                    others.push(fault);
-                    *sum += gradient;
-                    *largest = if size.abs() > largest.abs() {
-                        *size
-                    } else {
-                        *largest
-                    };
-                }
-                None => events.push((vec![fault], *size, gradient)),
+        let (mut findings, mut channels) = (Vec::new(), Vec::new());
+        let sizes = estimate.sizes();
+        let follows = |number: &usize| faults[*number].suspect.quantity().is_none();
+        let (by_motion, changes): (Vec<usize>, Vec<usize>) = (0..faults.len()).partition(follows);
+        let off_by = |numbers: &[usize]| {
+            let gradients = numbers.iter().map(|&k| estimate.gradient(k) * sizes[k]);
+            let sum = gradients.fold(DVector::zeros(UNKNOWNS), |sum, of| sum + of);
+            bent.solve(&sum).as_slice()[..COUNT].to_vec()
+        };
+        let mut events: Vec<Vec<usize>> = Vec::new();
+        for &number in &changes {
+            let is_same =
+                |event: &&mut Vec<usize>| is_one_event(&faults[event[0]], &faults[number]);
+            match events.iter_mut().find(is_same) {
+                Some(event) => event.push(number),
+                None => events.push(vec![number]),
             }
         }
-        for (faults, size, gradient) in events {
+        for event in events {
+            let faults: Vec<&Fault> = event.iter().map(|&number| &faults[number]).collect();
+            let largest = event.iter().map(|&number| sizes[number]);
+            let size = largest.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
             let fault = faults[0];
             let Some(quantity) = fault.suspect.quantity() else {
                 continue;
             };
-            let off = bent.solve(&gradient);
-            let (known, off) = (DMatrix::zeros(COUNT, COUNT), &off.as_slice()[..COUNT]);
-            let cost = Predicted::new(declared, &known, off).worst_ratio();
+            let known = DMatrix::zeros(COUNT, COUNT);
+            let cost = Predicted::new(declared, &known, &off_by(&event)).worst_ratio();
             if is_felt(cost) {
                 is_worth_it = true;
                 // What may be a change of the reference does not show the stage as it ends.
@@ -178,38 +163,24 @@ impl Finder<'_> {
                 is_clear &= !is_laser && !others.any(|other| other.is_beam());
                 channels.extend(faults.iter().map(|fault| fault.suspect.channel()));
             }
-            // The lag of a beam that was taken off because of another fault comes back.
-            let back = (0..3).find(|&beam| {
-                (fault.suspect, fault.shape.onset()) == (Suspect::late(3 + beam), None)
-                    && self.is_lag(off_middle(self.lags_s)[beam])
-            });
-            if let Some(beam) = back {
-                lags_s[beam] += 1e-3 * size;
-            } else if cost >= COST_MIN {
+            if cost >= COST_MIN {
                 // A robust fit may have rejected the rows that would have cost more.
                 findings.push(self.change(quantity, &faults, size, cost.min(own_cost)));
             }
         }
         let count = |of: Channel| channels.iter().filter(|other| **other == of).count();
         is_clear &= channels.iter().all(|of| count(*of) <= REPAIRS_MAX);
-        if let Some((fault, late_ms)) = self.late_beam(lags_s) {
-            // The lag is part of all that bent the fit.
-            findings.insert(0, self.change(Quantity::Time, &[&fault], late_ms, own_cost));
-        }
         // An error that follows the motion is never taken off.
-        let refitted = match changes.len() {
-            all if all == faults.len() => None,
-            0 => None,
-            _ => {
-                let refitted = self.refitted(faultless, &changes);
-                is_clear &= refitted.is_some();
-                refitted
-            }
-        };
-        let repaired = refitted.as_ref().unwrap_or(match changes.is_empty() {
-            true => faultless,
-            false => estimate,
+        let refitted = (!by_motion.is_empty() && !changes.is_empty()).then(|| {
+            let changes: Vec<Fault> = changes.iter().map(|&k| faults[k].clone()).collect();
+            self.refitted(faultless, &changes)
         });
+        is_clear &= !matches!(refitted, Some(None));
+        let repaired = match &refitted {
+            Some(Some(refitted)) => refitted,
+            _ if changes.is_empty() => faultless,
+            _ => estimate,
+        };
         let left = (repaired.values() - estimate.values()).as_slice()[..COUNT].to_vec();
         let expected = in_service(Predicted::new(declared, &covariance, &left), &left);
         let is_better = is_worth_it
@@ -219,24 +190,22 @@ impl Finder<'_> {
             && (self.is_bent || !findings.is_empty());
         let values = repaired.values();
         let motion = MotionFit::new(values.as_slice(), &covariance, by.shows_acceleration);
-        let middle = |values: [f64; 3]| values[0] - off_middle(values)[0];
-        let lag_s = middle(self.lags_s) + repaired.lag_s();
+        let mut probes_s = motion.dynamics.probe_lag_s;
+        probes_s.sort_by(f64::total_cmp);
         let repair = Repair {
             parameters: repaired.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
             // One late probe is no lag of all.
-            lag_s: lag_s - middle(motion.dynamics.probe_lag_s),
+            lag_s: repaired.lag_s() - probes_s[1],
             motion: motion.with_other_lags(stays.probe_lags_s),
         };
         let judged = if is_better { expected } else { predicted };
         let judged = judged.with_added(drifts);
-        let unexplained = variances(&bent.solve(&by_motion).as_slice()[..COUNT]);
+        let unexplained = variances(&off_by(&by_motion));
         let unexplained = [0, 1, 2].map(|axis| slow[axis] + unexplained[axis]);
-        let channel = faults
-            .iter()
-            .find(|fault| fault.suspect.quantity().is_none());
+        let first = by_motion.first().map(|&number| &faults[number]);
         if by.is_for_service {
-            findings.extend(unexplained_finding([unexplained, drifts], channel, &judged));
+            findings.extend(unexplained_finding([unexplained, drifts], first, &judged));
         }
         Some(Faults {
             findings,
@@ -246,20 +215,6 @@ impl Finder<'_> {
             repair: is_better.then_some((repair, expected)),
             residual,
         })
-    }
-
-    /// The beam that is late or early against the two others, and its lag, ms.
-    fn late_beam(&self, lags_s: [f64; 3]) -> Option<(Fault, f64)> {
-        let off_s = off_middle(lags_s);
-        let late = (0..3).filter(|&beam| self.is_lag(off_s[beam]));
-        let beam = late.max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
-        let fault = Fault {
-            suspect: Suspect::late(3 + beam),
-            shape: Shape::From(0, self.means.rows.rows.len()),
-            gain: 0.0,
-            alike: Vec::new(),
-        };
-        Some((fault, off_s[beam] * 1e3))
     }
 }
 
@@ -278,11 +233,9 @@ fn unexplained_finding(
         false => severity(cost(variances)).max(Severity::Warn),
     };
     let found = Finding::new(Kind::Inconsistent { ratio }).with_severity(severity);
+    let channel = |fault: &Fault| fault.suspect.channel();
     let found = Finding {
-        channels: fault
-            .map(|fault| fault.suspect.channel())
-            .into_iter()
-            .collect(),
+        channels: fault.map(channel).into_iter().collect(),
         alike: fault.map_or_else(Vec::new, |fault| fault.alike.clone()),
         ..found.with_cost(ratio)
     };

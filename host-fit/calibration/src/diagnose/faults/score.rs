@@ -2,7 +2,6 @@
 
 use super::effects::{Effects, Shape, Suspect, suspects};
 use super::estimate::{Estimate, RESIDUAL, WIDTH};
-use crate::diagnose::limits::UNDECIDED;
 use hallstage_input::channel::Channel;
 use hallstage_input::finding::Quantity;
 use hallstage_solver::estimator::gauss_newton::{Factor, Normal};
@@ -32,10 +31,6 @@ pub(super) struct Scan<'a> {
     effects: &'a Effects<'a>,
     estimate: &'a Estimate,
     steps: Vec<Step>,
-    /// Means where a step is more likely than elsewhere: the starts of movements, and where another channel has one.
-    likely: Vec<usize>,
-    /// A gain below this is chance.
-    undecided: f64,
 }
 
 /// A step of the filter that whitens, for signals of A, B, C.
@@ -65,13 +60,7 @@ struct Direction {
 }
 
 impl<'a> Scan<'a> {
-    /// After these faults, where residuals are `misfit` times noise.
-    pub(super) fn new(
-        effects: &'a Effects,
-        estimate: &'a Estimate,
-        faults: &[Fault],
-        misfit: f64,
-    ) -> Option<Self> {
+    pub(super) fn new(effects: &'a Effects, estimate: &'a Estimate) -> Option<Self> {
         let step = |(gain, row): (&Gain, &super::estimate::Row)| {
             let of = [gain.by_pose, gain.kalman, gain.factor];
             let [by_error, kalman, factor] = of.map(|rows| Matrix3::from(rows).transpose());
@@ -99,15 +88,10 @@ impl<'a> Scan<'a> {
                 after = step.seen.tr_mul(&step.seen) + step.stays.tr_mul(&(after * step.stays));
             }
         }
-        // Things change together, or between movements.
-        let starts = effects.means.rows.movements.iter().map(|m| m.start);
-        let known = faults.iter().filter_map(|fault| fault.shape.onset());
         Some(Self {
             effects,
             estimate,
             steps,
-            likely: starts.chain(known).collect(),
-            undecided: UNDECIDED * misfit,
         })
     }
 
@@ -206,14 +190,7 @@ impl<'a> Scan<'a> {
         let ((around, _), range) = coarse.max_by(|(a, _), (b, _)| a.1.total_cmp(&b.1))?;
         let wanted =
             |at: usize| (range.start + 1..end(range)).contains(&at) && at.abs_diff(around) < apart;
-        let fine = self.scan(column, range, wanted);
-        let likely = fine
-            .iter()
-            .copied()
-            .filter(|(at, _)| self.likely.contains(at));
-        let (likely, best) = (largest(likely), largest(fine.clone())?);
-        let likely = likely.filter(|(_, gain)| *gain > best.1 - self.undecided);
-        let (from, gain) = likely.unwrap_or(best);
+        let (from, gain) = largest(self.scan(column, range, wanted))?;
         Some((Shape::From(from, range.end), gain))
     }
 

@@ -66,7 +66,7 @@ impl Finder<'_> {
         // Other models lack terms, and are not for service.
         let with_motion = self.calibrated.is_for_service;
         let (effects, misfit) = (self.effects(estimate), misfit(&self.means, estimate));
-        let mut found = Scan::new(&effects, estimate, faults, misfit)?.faults(with_motion);
+        let mut found = Scan::new(&effects, estimate)?.faults(with_motion);
         if let Some(beam) = noisy_beam(&effects, estimate) {
             found.retain(|fault| fault.suspect.channels() == (beam..beam + 1));
         }

@@ -68,9 +68,7 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
         .and_then(|first| first.faultless(&means))
         .expect("one");
     let effects = Effects::new(&means, &stage, &estimate.parameters, estimate.lag_s());
-    let candidates = Scan::new(&effects, &estimate, &[], 1.0)
-        .expect("one")
-        .faults(true);
+    let candidates = Scan::new(&effects, &estimate).expect("one").faults(true);
     let large = candidates.iter().filter(|candidate| candidate.gain > 300.0);
     assert!(large.clone().count() > 10);
     let motion = large.clone().filter(|of| of.suspect.quantity().is_none());
