@@ -114,6 +114,31 @@ fn a_nonce_expires_after_five_seconds() {
 }
 
 #[test]
+fn a_nonce_lives_while_its_host_asks_and_sends() {
+    let off = Request::ServoOff { seconds: 1 };
+    let alive: [fn(&mut Bench); 3] = [
+        |bench| {
+            let again = bench.update(UpdateRequest::Challenge { part: 1 }, 7);
+            assert_eq!(again.0, Outcome::Done);
+        },
+        |bench| bench.data(7, TAG_INDEX, 0),
+        |bench| {
+            let missing = bench.ask(Request::ServoOff { seconds: 1 }, 7);
+            assert_eq!(missing.0, Outcome::Incomplete);
+        },
+    ];
+    for act in alive {
+        let mut bench = Bench::new(Some(KEY));
+        let own = tag(&KEY, &bench.nonce(), &Command::new(off, 7), &[]);
+        bench.ticks(IDLE_S * TICKS_PER_S);
+        act(&mut bench);
+        bench.ticks(IDLE_S * TICKS_PER_S);
+        bench.tag(7, own);
+        assert_eq!(bench.ask(off, 7), DONE);
+    }
+}
+
+#[test]
 fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
     let mut bench = Bench::new(Some(KEY));
     let off = Request::ServoOff { seconds: 1 };

@@ -8,8 +8,13 @@
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
-use super::filter::{Conversion, T_MOD_NS, codes};
-use super::{Input, Row};
+mod frames;
+mod variant;
+
+pub use variant::Variant;
+
+use super::Row;
+use super::filter::{Conversion, T_MOD_NS};
 use std::collections::VecDeque;
 
 /// Period of CLKIN, ns.
@@ -20,51 +25,8 @@ const POWER_ON_NS: u64 = 250_000;
 const INITIAL_WAIT: u64 = 256 + 44;
 /// A longer low on SYNC/RESET is a reset, in periods of CLKIN.
 const RESET_CLKIN: u64 = 2048;
-/// The CRC of the registers takes one period of CLKIN a bit: a change shows after two passes.
-const MAP_CRC_NS: u64 = 2 * 16 * (LAST as u64 - MODE as u64 + 1) * T_CLKIN_NS;
 
-const ID: usize = 0x00;
-const STATUS: usize = 0x01;
-const MODE: usize = 0x02;
 const CLOCK: usize = 0x03;
-const LAST: usize = 0x30;
-const REGMAP_CRC: usize = 0x3e;
-
-const REG_CRC_EN: u16 = 1 << 13;
-
-/// Behaviour where the sheet is silent; times in periods of the modulators.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Variant {
-    /// From a resynchronisation until the filters take data: none by 8.5.2, 44 by equation 9, 300 by table 8-3.
-    pub wait: u64,
-    /// From the last sample of a conversion until it is ready: the 44 of equation 9 may lie here.
-    pub delay: u64,
-    /// A conversion is removed when its frame ends, not when it begins.
-    pub late_pop: bool,
-}
-
-impl Variant {
-    /// All plausible behaviours, the plainest first.
-    pub const ALL: [Self; 8] = {
-        let times = [(44, 0), (0, 0), (0, 44), (INITIAL_WAIT, 0)];
-        let mut all = [Self {
-            wait: 44,
-            delay: 0,
-            late_pop: false,
-        }; 8];
-        let mut k = 0;
-        while k < 8 {
-            let (wait, delay) = times[k / 2];
-            all[k] = Self {
-                wait,
-                delay,
-                late_pop: k % 2 == 1,
-            };
-            k += 1;
-        }
-        all
-    };
-}
 
 /// The part.
 pub struct Ads131m08 {
@@ -124,27 +86,6 @@ impl Default for Ads131m08 {
         new.power_up(0);
         new
     }
-}
-
-/// CRC-16 (CCITT) of the sheet, a byte at a time.
-fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
-    const TABLE: [u16; 256] = {
-        let mut table = [0; 256];
-        let mut k = 0;
-        while k < 256 {
-            let (mut crc, mut bit) = ((k as u16) << 8, 0);
-            while bit < 8 {
-                crc = crc << 1 ^ if crc >> 15 == 1 { 0x1021 } else { 0 };
-                bit += 1;
-            }
-            table[k] = crc;
-            k += 1;
-        }
-        table
-    };
-    bytes.into_iter().fold(0xffff, |crc, byte| {
-        crc << 8 ^ TABLE[usize::from((crc >> 8) as u8 ^ byte)]
-    })
 }
 
 impl Ads131m08 {
@@ -264,142 +205,6 @@ impl Ads131m08 {
     fn is_in_reset(&self, now_ns: u64) -> bool {
         let low = self.low_since_ns.map_or(0, |since| now_ns - since);
         now_ns < self.ready_ns || low >= RESET_CLKIN * T_CLKIN_NS
-    }
-
-    /// CRC of the registers 0x02 to 0x30.
-    fn registers_crc(&self) -> u16 {
-        let covered = &self.registers[MODE..=LAST];
-        crc(covered.iter().flat_map(|value| value.to_be_bytes()))
-    }
-
-    fn check_registers(&mut self, now_ns: u64) {
-        let changed = self.map_changed_ns;
-        if self.registers[MODE] & REG_CRC_EN != 0
-            && changed.is_some_and(|at| now_ns - at >= MAP_CRC_NS)
-        {
-            self.map_changed_ns = None;
-            let now = self.registers_crc();
-            self.map_flag |= now != self.map_crc;
-            self.map_crc = now;
-            self.registers[REGMAP_CRC] = now;
-        }
-    }
-
-    fn status(&self) -> u16 {
-        let ready = if self.store.is_empty() {
-            0
-        } else {
-            self.registers[CLOCK] >> 8
-        };
-        u16::from(self.resynchronised) << 14
-            | u16::from(self.map_flag) << 13
-            | self.registers[MODE] & 0x0f00
-            | ready
-    }
-
-    /// Chip select falls: the frame is fixed.
-    pub fn select(
-        &mut self,
-        now_ns: u64,
-        input: &Input,
-        faulty: impl FnOnce(Row) -> [i32; 8],
-        flipped: bool,
-    ) {
-        self.received.clear();
-        self.reply.clear();
-        self.listens = !self.is_in_reset(now_ns);
-        if !self.listens {
-            return;
-        }
-        self.advance(now_ns);
-        self.is_selected = true;
-        self.check_registers(now_ns);
-        let status = self.status();
-        let response = self.response.unwrap_or_else(|| {
-            (self.resynchronised, self.map_flag) = (false, false);
-            status
-        });
-        self.shown = self.store.front().copied();
-        if let Some(conversion) = self.shown {
-            self.codes = codes(conversion, input);
-            if !self.variant.late_pop {
-                self.store.pop_front();
-            }
-        }
-        let codes = faulty(self.codes);
-        let word = |value: u16| {
-            let [high, low] = value.to_be_bytes();
-            [high, low, 0]
-        };
-        self.reply.extend(word(response));
-        let enabled = self.registers[CLOCK] >> 8;
-        for (channel, code) in codes.into_iter().enumerate() {
-            let code = if enabled >> channel & 1 == 1 { code } else { 0 };
-            self.reply.extend(&code.to_be_bytes()[1..]);
-        }
-        self.reply.extend(word(crc(self.reply.iter().copied())));
-        if flipped {
-            self.reply[8] ^= 0x10;
-        }
-    }
-
-    /// One byte each way.
-    pub fn exchange(&mut self, out: u8) -> u8 {
-        self.received.push(out);
-        let at = self.received.len() - 1;
-        self.reply.get(at).copied().unwrap_or(0)
-    }
-
-    /// Chip select rises: the command is executed.
-    pub fn deselect(&mut self, now_ns: u64) {
-        if !self.listens {
-            return;
-        }
-        self.advance(now_ns);
-        if self.variant.late_pop
-            && self.shown.is_some()
-            && self.store.front() == self.shown.as_ref()
-        {
-            self.store.pop_front();
-        }
-        self.is_selected = false;
-        if !self.store.is_empty() {
-            self.fell_ns = Some(now_ns);
-        }
-        let word = |k: usize| match self.received.get(k..k + 2) {
-            Some(&[high, low]) => u16::from_be_bytes([high, low]),
-            _ => 0,
-        };
-        let (command, data) = (word(0), word(3));
-        let register = usize::from(command >> 7 & 0x3f);
-        self.response = None;
-        match (command >> 13, command & 0x7f) {
-            (0, 0x11) if command == 0x0011 => {
-                let whole = self.received.len() >= 30;
-                self.response = Some(if whole { 0xff28 } else { 0x0011 });
-                if whole {
-                    self.reset(now_ns);
-                }
-            }
-            (0b101, 0) => {
-                self.response = Some(match register {
-                    STATUS => self.status(),
-                    _ => self.registers[register],
-                });
-            }
-            (0b011, 0) => {
-                if !matches!(register, ID | STATUS | REGMAP_CRC) && register <= LAST {
-                    let osr = self.osr();
-                    self.registers[register] = data;
-                    self.map_changed_ns = Some(now_ns);
-                    if self.osr() != osr {
-                        self.restart(now_ns, false);
-                    }
-                }
-                self.response = Some(0x4000 | command & 0x1f80);
-            }
-            _ => {}
-        }
     }
 }
 

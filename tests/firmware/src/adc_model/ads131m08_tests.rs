@@ -1,6 +1,8 @@
 //! The tables and texts of the data sheet, one test each.
 
+use super::frames::crc;
 use super::*;
+use crate::adc_model::Input;
 
 const T_0: u64 = 10_000_000;
 const CONSTANT: Row = [60_000, -60_000, 1, 0, -1, 600];

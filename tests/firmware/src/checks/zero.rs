@@ -71,8 +71,8 @@ pub fn over_resets(bench: &Bench) {
     }
 }
 
-/// The running blob is gone from flash, or the retained record is damaged in a brown-out: no pose comes, and the state says
-/// so and reports a lost zero deviation.
+/// The running blob is gone from flash, or the retained record is damaged, when a brown-out or the watchdog resets: no pose
+/// comes, and the state says so and reports a lost zero deviation.
 pub fn lost(bench: &Bench) {
     let record = bench.image.address("RETAINED");
     type Change<'c> = &'c dyn Fn(&mut Machine);
@@ -84,14 +84,18 @@ pub fn lost(bench: &Bench) {
             machine.flip(record, 8 * 24 + 5);
         }),
     ];
-    for (fault, reason, change) in changes {
+    let resets: [fn(&mut Machine); 2] = [Machine::brown_out, |machine| machine.hold_ns = 25 * MS];
+    let cases = changes
+        .iter()
+        .flat_map(|change| resets.map(|reset| (change, reset)));
+    for ((fault, reason, change), reset) in cases {
         let mut machine = re_zeroed(bench);
         change(&mut machine);
-        machine.brown_out();
+        reset(&mut machine);
         Seen::after(&mut machine, 300);
         let seen = Seen::after(&mut machine, 300);
         assert_eq!(seen.axes.len(), 0);
-        assert_eq!(seen.last_state(), Some((NodeState::Stopped, reason)));
+        assert_eq!(seen.last_state(), Some((NodeState::Stopped, *reason)));
         assert_eq!(seen.page(11), Some(board_check::ZERO_LOST));
         println!("FAULT   {fault} | in the first state | 0");
     }
