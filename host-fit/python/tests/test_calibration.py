@@ -182,6 +182,7 @@ def test_residuals_are_plotted_in_seconds_with_their_drift_in_one_figure(cal: hs
     rows, drift = panels[0].get_lines()
     assert np.isclose(rows.get_xdata()[-1], 30, atol=0.1)
     # The noise of a row is 0.9 um, the step 2 um.
+    assert np.std(drift.get_ydata()[2000:7000]) < 0.3 < 0.8 < np.std(rows.get_ydata()[2000:7000])
     assert np.isclose(drift.get_ydata()[10_000] - drift.get_ydata()[5000], 2, atol=0.3)
     _, ax = pyplot.subplots()
     assert r.plot(ax=ax) is ax and len(pyplot.get_fignums()) == 2
