@@ -13,36 +13,49 @@ pub(crate) use bus::{Bus, now_us};
 pub(crate) use run::run;
 
 use crate::bus::BusAddress;
+use crate::cli::arguments::{hold, seconds};
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
+use clap::Args;
 use runtime::OnInvalid;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Settings of `live`.
-#[derive(Debug)]
+/// Arguments of `live`.
+#[derive(Debug, Args)]
 pub(crate) struct LiveSettings {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
+    #[arg(long, value_name = "IFACE")]
     pub(crate) can: BusAddress,
     /// The parameter blob.
+    #[arg(value_name = "params.bin")]
     pub(crate) params: PathBuf,
     /// Refuse a blob unless its stage has this serial number.
+    #[arg(long, value_name = "TEXT")]
     pub(crate) serial: Option<String>,
     /// Record every frame received and sent, as `candump -L` does, in a new file.
+    #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Repeat the last valid pose for at most N ticks where codes are bad.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
     pub(crate) hold: OnInvalid,
     /// Send nothing: only watch, record and show.
+    #[arg(long)]
     pub(crate) listen_only: bool,
     /// End after this many seconds; without it, on Ctrl-C.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Duration>,
-    /// Seconds from line to line.
+    /// Seconds from line to line, where lines are shown.
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     pub(crate) every: Duration,
-    /// Show lines, also on a terminal.
+    /// Show lines on a terminal, too, in place of the scope.
+    #[arg(long)]
     pub(crate) plain: bool,
     /// Give up a tick if frames are still missing after this time.
+    #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) assembly_us: u32,
     /// Call the sensors stale after this time without a good frame.
+    #[arg(long, value_name = "US", default_value_t = 3_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) stale_us: u32,
 }
 

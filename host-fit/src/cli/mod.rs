@@ -35,6 +35,7 @@ mod update;
 
 pub use fit_options::FitOptions;
 
+use crate::bus::live::LiveSettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
 use crate::join::JoinSettings;
@@ -122,7 +123,7 @@ commands! {
     /// Show the sensors of a log in the terminal, also while the log grows.
     Scope(scope::ScopeArgs) => scope::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(live::LiveArgs) => live::run,
+    Live(LiveSettings) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs) => record::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
