@@ -65,6 +65,14 @@ pub enum JoinError {
         /// Rows from one new value to the next.
         rows: f64,
     },
+    /// Few samples of the reference are far from their neighbours.
+    #[error(
+        "a few samples of the reference jump away by up to {largest_um:.0} um and back, which is no motion; remove them, or write nothing where a value is missing"
+    )]
+    ReferenceSpikes {
+        /// The largest jump, um.
+        largest_um: f64,
+    },
     /// A column is not what stage.toml says.
     #[error(
         "with {change} the reference explains {percent:.0} % of the Hall signals' motion, and {without_percent:.0} % without; correct the \

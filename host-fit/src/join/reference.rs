@@ -177,7 +177,7 @@ impl Reference {
     /// Checks that a cubic through four samples follows the motion: the fourth differences are small.
     ///
     /// # Errors
-    /// `ReferenceTooSlow`, `ReferenceHeld`.
+    /// `ReferenceTooSlow`, `ReferenceHeld`, `ReferenceSpikes`.
     pub(super) fn check_speed(&self, stage: &Stage) -> Result<(), JoinError> {
         let scale = self
             .quantities
@@ -210,7 +210,10 @@ impl Reference {
         } else if held_rows > HELD_ROWS {
             Err(JoinError::ReferenceHeld { rows: held_rows })
         } else if most_m <= limit_m {
-            Ok(())
+            let largest_m = errors_m.iter().copied().fold(0.0, f64::max) / (6.0 * CUBIC);
+            Err(JoinError::ReferenceSpikes {
+                largest_um: largest_m * 1e6,
+            })
         } else {
             Err(JoinError::ReferenceTooSlow {
                 period_ms: self.period_us * 1e-3,

@@ -60,15 +60,23 @@ fn tables_are_joined_in_any_order_whatever_their_rates_ends_and_gaps() {
 }
 
 #[test]
-fn a_reference_with_jitter_and_a_few_spikes_has_a_sample_for_every_row() {
-    let mut ifm = "t_us,x_m,y_m,rz_rad\n".to_owned();
-    for k in 0..750 {
-        let t_us = 2_000.0 * f64::from(k) + f64::from(k * 7919 % 41) - 20.0;
-        let [x, y, rz] = pose(t_us);
-        let x = if k % 200 == 100 { -9.999e-6 } else { x };
-        writeln!(ifm, "{t_us},{x:.12},{y:.12},{rz:.12}").expect("a string");
-    }
-    let report = tables(&sensors(4_000.0, 500.0, |_| true), &ifm).run();
+fn a_reference_with_jitter_has_a_sample_for_every_row_and_spikes_are_named() {
+    let ifm = |spike_m: Option<f64>| {
+        let mut ifm = "t_us,x_m,y_m,rz_rad\n".to_owned();
+        for k in 0..750 {
+            let t_us = 2_000.0 * f64::from(k) + f64::from(k * 7919 % 41) - 20.0;
+            let [x, y, rz] = pose(t_us);
+            let x = spike_m.filter(|_| k % 200 == 100).unwrap_or(x);
+            writeln!(ifm, "{t_us},{x:.12},{y:.12},{rz:.12}").expect("a string");
+        }
+        ifm
+    };
+    let table = sensors(4_000.0, 500.0, |_| true);
+    let spikes = tables(&table, &ifm(Some(-2e-3)));
+    spikes.refused(|error| {
+        matches!(error, JoinError::ReferenceSpikes { largest_um } if (1.6e3..2.4e3).contains(largest_um))
+    });
+    let report = tables(&table, &ifm(None)).run();
     assert_eq!(report.join.too_far, 0);
     assert!(report.join.rows > 2_900, "{:?}", report.join);
 }
