@@ -21,7 +21,7 @@ use runtime::ParameterSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A calibration of a stage, and what is known of it. Made by `fit`, `Calibration.load`,
+/// A calibration of a stage with its statistics. Made by `fit`, `Calibration.load`,
 /// `Calibration.recalibrate` and `Calibration.with_parameters`.
 #[pyclass(frozen, module = "hallstage")]
 pub struct Calibration {
@@ -80,7 +80,7 @@ impl Calibration {
 
 #[pymethods]
 impl Calibration {
-    /// Reads a parameter blob, and what is known of its errors if `params.bin.posterior` stands beside it.
+    /// Reads a parameter blob, and the statistics of its errors if `params.bin.posterior` stands beside it.
     ///
     /// Raises `OSError` where it cannot be read, `ValueError` where it is no sound blob, or one for other
     /// scales than the stage has.
@@ -162,7 +162,7 @@ impl Calibration {
         }
     }
 
-    /// What the files of a calibration hold.
+    /// The bytes of its files.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let (blob, posterior) = files(py, &self.set, self.known.as_ref())?;
         let stage = self.stage.clone_ref(py);
@@ -194,7 +194,7 @@ pub fn files<'py>(
     Ok((PyBytes::new(py, &blob), posterior))
 }
 
-/// What such bytes hold.
+/// A blob and its posterior from these bytes.
 pub fn from_files(
     blob: &[u8],
     posterior: Option<&[u8]>,

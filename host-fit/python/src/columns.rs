@@ -25,7 +25,7 @@ impl Log {
         self.stage.clone_ref(py)
     }
 
-    /// What is odd about the logs, in words.
+    /// Warnings of the logs, in words.
     #[getter(warnings)]
     fn in_words(&self) -> Vec<String> {
         self.warnings()
@@ -47,7 +47,7 @@ impl Log {
         self.held.numbers(py, |held| held.row.t_us as f64 / 1e6)
     }
 
-    /// Number of the movement of the rows: int64, (n,); the movements of a second log have numbers above those of the first.
+    /// Number of the movement of the rows: int64, (n,); the movements of a second log have larger numbers than the movements of the first.
     #[getter]
     fn movement<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         self.held.numbers(py, |held| held.movement)
@@ -59,7 +59,7 @@ impl Log {
         self.held.triples(py, |row| row.frame.hall())
     }
 
-    /// Codes of the gaps 1, 2, 3: int32, (n, 3); None of a log that has gaps or the vertical pose itself.
+    /// Codes of the gaps 1, 2, 3: int32, (n, 3); `None` of a log that has gaps or the vertical pose itself.
     #[getter]
     fn caps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i32>>>> {
         let codes = self
@@ -96,7 +96,7 @@ impl Log {
     }
 
     /// The rows as a `pandas.DataFrame` in SI and degC: number of the log where there are several, movement, time, codes, the
-    /// vertical pose where there are no codes of the gaps, reference, temperatures. `Log.load` reads what its `to_csv` writes.
+    /// vertical pose where there are no codes of the gaps, reference, temperatures. `Log.load` reads the file of its `to_csv`.
     /// The reference is the pose, or the beams where `[interferometer]` has places, scales or air. Needs pandas.
     #[getter]
     fn df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -106,7 +106,7 @@ impl Log {
 }
 
 impl Log {
-    /// What the log holds, by column.
+    /// The columns of the log by name.
     pub fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let held = &self.held;
         let columns = PyDict::new(py);

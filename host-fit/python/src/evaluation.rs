@@ -35,7 +35,7 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Judges a parameter set, and what is known of it, on a log.
+    /// Judges a parameter set with its posterior on a log.
     pub fn new(
         py: Python<'_>,
         log: &Log,
@@ -73,7 +73,7 @@ impl Evaluation {
 
 #[pymethods]
 impl Evaluation {
-    /// "good", "limited" or "refused", or None where that is not known.
+    /// "good", "limited" or "refused", or `None` where that is not known.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         finding::figures(py, &self.evaluated.diagnosis.verdict)
@@ -111,27 +111,27 @@ impl Evaluation {
         zero_deviations(py, &self.evaluated.judgement)
     }
 
-    /// What is wrong with the logs, the most severe first.
+    /// Faults of the logs, the most severe first.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         finding::list(py, &self.evaluated.diagnosis.findings)
     }
 
-    /// What the user should know besides.
+    /// Further messages to the user.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let warnings = self.report.warnings.iter();
         warnings.map(|warning| python(warning)).collect()
     }
 
-    /// Why the calibration does not describe these logs, and what to do, or None if it does.
+    /// Why the calibration does not describe these logs, and what to do, or `None` if it does.
     #[getter]
     fn refusal(&self) -> Option<String> {
         let message = self.evaluated.refusal_message();
         message.map(|message| python(&message))
     }
 
-    /// The same as a name that stays: "other_log", "beyond_limit" or "findings"; None if it does.
+    /// The same as a name that stays: "other_log", "beyond_limit" or "findings"; `None` if it does.
     #[getter]
     fn refusal_code(&self) -> Option<&'static str> {
         self.evaluated.refusal.as_ref().map(Refusal::code)

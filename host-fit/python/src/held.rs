@@ -24,7 +24,7 @@ pub struct HeldRows {
 }
 
 impl HeldRows {
-    /// Adds the next row. The movements of a second log get numbers above those of the first.
+    /// Adds the next row. The movements of a second log get larger numbers than the movements of the first.
     pub fn push(&mut self, log: usize, movement: i64, row: &Row) {
         let (last_log, last, number) = self.last;
         let number = match log {

@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 #[pymethods]
 impl Calibration {
-    /// "good", "limited" or "refused", or None where that is not known.
+    /// "good", "limited" or "refused", or `None` where that is not known.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let verdict = self
@@ -36,7 +36,7 @@ impl Calibration {
         finding::figures(py, &verdict)
     }
 
-    /// What is wrong with the log, the most severe first: a list of `Finding`.
+    /// Faults of the log, the most severe first: a list of `Finding`.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let found = self
@@ -46,14 +46,14 @@ impl Calibration {
         finding::list(py, found.unwrap_or_default())
     }
 
-    /// What the user should know besides.
+    /// Further messages to the user.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let warnings = self.origin.warnings().iter();
         warnings.map(|warning| words::python(warning)).collect()
     }
 
-    /// All figures of `host-fit fit --json` or `host-fit recalibrate --json` as a dict, in SI; None of a calibration that was
+    /// All figures of `host-fit fit --json` or `host-fit recalibrate --json` as a dict, in SI; `None` of a calibration that was
     /// read from its files.
     #[getter]
     fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -83,7 +83,7 @@ impl Calibration {
         by_axis(py, &judged.unwrap_or(self.set.fit.peak.map(f64::from)))
     }
 
-    /// Zero deviations of the Hall probes A, B, C, a row for each movement: float64, (movements, 3), m; None of a calibration
+    /// Zero deviations of the Hall probes A, B, C, a row for each movement: float64, (movements, 3), m; `None` of a calibration
     /// that was read from its files.
     #[getter]
     fn zero_deviations<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {

@@ -1,4 +1,4 @@
-//! What is known of the parameters of a calibration, and calibrations with other parameters.
+//! The parameters of a calibration with their statistics, and calibrations with other parameters.
 
 use crate::calibration::Calibration;
 use crate::error::wrong;
@@ -59,13 +59,13 @@ impl Calibration {
 
     /// The uncertainty budget as a `pandas.DataFrame`, a row for each source: `u` in `unit`, contributions over service
     /// (`rms_x_m`, ...), at its ends (`ends_x_m`, ...) and by a unit of the source (`sensitivity_x_m`, ...); then
-    /// `combined`, and the inputs that are not included. None without a budget. Needs pandas.
+    /// `combined`, and the inputs that are not included. `None` without a budget. Needs pandas.
     #[getter]
     fn budget<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.known().budget_frame(py)
     }
 
-    /// White noise of the readings of the Hall probes A, B, C: float64, (3,), m; None without a posterior.
+    /// White noise of the readings of the Hall probes A, B, C: float64, (3,), m; `None` without a posterior.
     #[getter]
     fn noise<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         let known = self.known.as_ref()?;

@@ -65,7 +65,7 @@ impl Log {
         Self::read(py, source, stage, how, |error| log_error(py, error))
     }
 
-    /// A log of a `pandas.DataFrame`, with the columns that a file would have: those of `log.df`, or those that the stage
+    /// A log of a `pandas.DataFrame`, with the columns of a file: the columns of `log.df`, or the columns that the stage
     /// names. A named index is a column.
     ///
     /// `name` stands for the file in reports; `bad_rows` as for `load`. Raises `LogError` with `.line`, the row from 0, and

@@ -7,7 +7,7 @@ use crate::stage::Stage;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// What `__reduce__` gives: a class makes the object again by its `_restore`, from these arguments after the class.
+/// The answer of `__reduce__`: a class makes the object again by its `_restore`, from these arguments after the class.
 pub fn restored<'py>(
     py: Python<'py>,
     arguments: impl IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>,

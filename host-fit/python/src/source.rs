@@ -27,7 +27,7 @@ pub enum Logs {
 /// Where a log can be read again.
 pub struct Source {
     pub logs: Logs,
-    /// Whether the columns are those of the package, not those of the stage.
+    /// Whether the package names the columns, not the stage.
     pub is_own: bool,
 }
 
@@ -35,7 +35,7 @@ impl Source {
     /// Files in the form that the package writes, or in the form that the stage describes.
     pub fn files(paths: Vec<PathBuf>, stage: &Designed) -> Self {
         let is_own = paths.iter().all(|path| {
-            // What a pipe gives can be read once.
+            // A pipe can be read once.
             path.is_file() && TextReader::open(path).is_ok_and(|text| is_own(text, &stage.log))
         });
         Self {

@@ -7,7 +7,7 @@ use pyo3::types::PyDict;
 use runtime::frame::MISSING_CODE;
 use std::io::Write;
 
-/// So many rows are written between looks at signals.
+/// Rows that are written between two looks at signals.
 const ROWS_AT_ONCE: usize = 1 << 16;
 
 /// A column.

@@ -27,7 +27,7 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 /// on at once: the flag of the watch is set, and the work ends when it looks at the flag.
 ///
 /// # Errors
-/// What a signal raises, such as `KeyboardInterrupt`.
+/// The exception of a signal, such as `KeyboardInterrupt`.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(Watch<'static>) -> T + Send + 'static,

@@ -1,4 +1,4 @@
-"""What calibrations consist of."""
+"""Parameters, findings and residuals of calibrations."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Finding(NamedTuple):
     `code`: a name that stays, explained in the reference of `host-fit`. `severity`: "note", "warn" or "refuse".
     `message`: evidence and remedy. `channel`, such as "hall_a", "cap_1", "ifm_y1", "x"; `movement`; `t_s`: when, s in
     the log; `value`: how large, in `unit`; `cost`: predicted errors in service over the noise floor, with this alone.
-    What does not apply is None.
+    A field that does not apply is None.
     """
 
     code: str
@@ -65,7 +65,7 @@ class Finding(NamedTuple):
 
 
 class Findings(list[Finding]):
-    """What is wrong with a log, the most severe first: a list of `Finding`.
+    """Faults of a log, the most severe first: a list of `Finding`.
 
     `verdict`: "good", "limited" or "refused", of the calibration that the log gives. `refusal`: why the log is refused, and
     `refusal_code` the same as a name that stays, "no_fit" or "findings"; None where it is not refused.
@@ -191,7 +191,7 @@ class Residuals:
 
 
 def _mean(errors: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
-    """The mean over so many rows about each row, without rows that are NaN."""
+    """The mean over a number of rows about each row, without rows that are NaN."""
     window = np.ones(max(1, min(rows, len(errors))))
     known = np.isfinite(errors)
     counts = np.convolve(known, window, "same")
