@@ -22,14 +22,14 @@
 #define HALL_NODISCARD
 #endif
 
-// Words of a decoder.
-#define HALL_DECODER_WORDS 124
+// Words of 64 bits of a decoder.
+#define HALL_DECODER_WORDS 63
 
-// Words of a servo.
-#define HALL_SERVO_WORDS 55
+// Of a servo.
+#define HALL_SERVO_WORDS 29
 
-// Words of a predictor.
-#define HALL_PREDICTOR_WORDS 37
+// Of a predictor.
+#define HALL_PREDICTOR_WORDS 19
 
 // Major version of the library that this header belongs to.
 #define HALL_RUNTIME_VERSION_MAJOR 0
@@ -40,8 +40,11 @@
 // Patch version.
 #define HALL_RUNTIME_VERSION_PATCH 0
 
-// The version as one number that can be compared: major << 16, minor << 8, patch.
-#define HALL_RUNTIME_VERSION (((HALL_RUNTIME_VERSION_MAJOR << 16) | (HALL_RUNTIME_VERSION_MINOR << 8)) | HALL_RUNTIME_VERSION_PATCH)
+// Version of the sizes and fields of the structs in this header.
+#define HALL_LAYOUT_VERSION 1
+
+// The version as one number that can be compared: layout << 24, major << 16, minor << 8, patch.
+#define HALL_RUNTIME_VERSION ((((HALL_LAYOUT_VERSION << 24) | (HALL_RUNTIME_VERSION_MAJOR << 16)) | (HALL_RUNTIME_VERSION_MINOR << 8)) | HALL_RUNTIME_VERSION_PATCH)
 
 // Hall code A is at a rail, implausible or missing.
 #define HALL_STATUS_HALL_A (1 << 0)
@@ -189,14 +192,14 @@ typedef uint32_t HallRezero;
 
 // A decoder, as C sees it. Its contents are private.
 typedef struct {
-  uint32_t mark;
-  uint32_t opaque[HALL_DECODER_WORDS];
+  uint64_t mark;
+  uint64_t opaque[HALL_DECODER_WORDS];
 } HallDecoder;
 
 // A servo, as C sees it. Its contents are private.
 typedef struct {
-  uint32_t mark;
-  uint32_t opaque[HALL_SERVO_WORDS];
+  uint64_t mark;
+  uint64_t opaque[HALL_SERVO_WORDS];
 } HallServo;
 
 // The codes of one servo period. Time and sequence arrive as data: the runtime reads
@@ -262,8 +265,8 @@ typedef struct {
 
 // A predictor, as C sees it. Its contents are private.
 typedef struct {
-  uint32_t mark;
-  uint32_t opaque[HALL_PREDICTOR_WORDS];
+  uint64_t mark;
+  uint64_t opaque[HALL_PREDICTOR_WORDS];
 } HallPredictor;
 
 // A and L of a stage: q' = q + A a + L v.
@@ -285,6 +288,11 @@ typedef struct {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+// HALL_RUNTIME_VERSION of the library. A header of another layout has structs of other sizes: compare it with the
+// header's once, before any other call.
+HALL_NODISCARD
+uint32_t hall_version(void);
 
 // Whether floating-point arithmetic is set as after a reset, so that poses are, bit for bit,
 // those that the host computed. Check it once, before the first tick.

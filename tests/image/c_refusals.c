@@ -101,6 +101,7 @@ static int run(void)
     HallReading first, again;
     int line;
 
+    CHECK(hall_version() == HALL_RUNTIME_VERSION);
     /* Memory that was never filled: zeros, and what may lie on a stack. */
     CHECK(hall_servo_start(&servo, &unloaded, 2) == HALL_RESULT_NOT_LOADED);
     if ((line = refuses(&servo, HALL_RESULT_NOT_STARTED)) != 0)

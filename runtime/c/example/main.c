@@ -34,6 +34,10 @@ static bool read_frame(uint32_t period, HallFrame *frame)
 
 int main(void)
 {
+    if (hall_version() != HALL_RUNTIME_VERSION) {
+        printf("the header belongs to another library\n");
+        return 97;
+    }
     if (!hall_arithmetic_is_sound()) {
         printf("the FPU is not set as after reset\n");
         return 98;

@@ -5,7 +5,9 @@
 //! can panic, only [`hall_servo_start`] keeps a pointer. A null pointer is refused, and so is a
 //! decoder that was never loaded or a servo that was never started: keep both in static memory,
 //! which is zero until they are filled. Call the functions of one servo from one context only.
-#![no_std]
+//!
+//! It also builds for a computer, for the unit tests of the program that uses it.
+#![cfg_attr(target_os = "none", no_std)]
 
 mod storage;
 pub mod types;
@@ -19,13 +21,24 @@ use runtime::{
     Predictor, RawFrame, Reading,
 };
 pub use storage::{HallDecoder, HallPredictor, HallServo};
-pub use types::{HALL_RUNTIME_VERSION, HallPlanarPose, HallReading, HallResult, HallRezero};
+pub use types::{
+    HALL_LAYOUT_VERSION, HALL_RUNTIME_VERSION, HallPlanarPose, HallReading, HallResult, HallRezero,
+};
 
 /// A panic cannot be reached: the tests link every function of the runtime against a panic
 /// handler that does not exist. The language requires one.
+#[cfg(target_os = "none")]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {}
+}
+
+/// HALL_RUNTIME_VERSION of the library. A header of another layout has structs of other sizes: compare it with the
+/// header's once, before any other call.
+#[must_use]
+#[unsafe(no_mangle)]
+pub extern "C" fn hall_version() -> u32 {
+    HALL_RUNTIME_VERSION
 }
 
 /// Whether floating-point arithmetic is set as after a reset, so that poses are, bit for bit,
@@ -334,6 +347,7 @@ impl From<BlobError> for HallResult {
             BlobError::Parameters(_) => Self::UnusableParameters,
             BlobError::OtherStage => Self::OtherStage,
             BlobError::BufferTooSmall { .. } => Self::Truncated,
+            _ => Self::UnusableParameters,
         }
     }
 }

@@ -8,8 +8,11 @@ pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
 pub const HALL_RUNTIME_VERSION_MINOR: u32 = 2;
 /// Patch version.
 pub const HALL_RUNTIME_VERSION_PATCH: u32 = 0;
-/// The version as one number that can be compared: major << 16, minor << 8, patch.
-pub const HALL_RUNTIME_VERSION: u32 = (HALL_RUNTIME_VERSION_MAJOR << 16)
+/// Version of the sizes and fields of the structs in this header.
+pub const HALL_LAYOUT_VERSION: u32 = 1;
+/// The version as one number that can be compared: layout << 24, major << 16, minor << 8, patch.
+pub const HALL_RUNTIME_VERSION: u32 = (HALL_LAYOUT_VERSION << 24)
+    | (HALL_RUNTIME_VERSION_MAJOR << 16)
     | (HALL_RUNTIME_VERSION_MINOR << 8)
     | HALL_RUNTIME_VERSION_PATCH;
 
