@@ -2,22 +2,26 @@
 //! what a computer needs to take part in it.
 //!
 //! The crate is `no_std`, allocates nothing and reads no clock: time arrives as data. Only
-//! [`socketcan`] needs an operating system.
+//! `socketcan` needs an operating system. No feature is on by default.
 //!
-//! | module | what it holds |
-//! |---|---|
-//! | [`adc`] | converters on SPI: codes to raw frames |
-//! | [`can`] | frames, signals and identifiers; coding, protection, assembly of a tick |
-//! | [`candump`] | one line of a `candump -L` log, read and written |
-//! | `socketcan` | SocketCAN on Linux (feature `socketcan`) |
+//! | module | feature | what it holds |
+//! |---|---|---|
+//! | `adc` | `adc` | converters on SPI: codes to raw frames |
+//! | `can` | `can` | frames, signals and identifiers; coding, protection, assembly of a tick |
+//! | `can::update` | `update` | new parameters over the bus, with a key |
+//! | `candump` | `can` | one line of a `candump -L` log, read and written |
+//! | `socketcan` | `socketcan` | SocketCAN on Linux |
 #![no_std]
 #![forbid(unsafe_code)]
 
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 extern crate std;
 
+#[cfg(feature = "adc")]
 pub mod adc;
+#[cfg(feature = "can")]
 pub mod can;
+#[cfg(feature = "can")]
 pub mod candump;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 pub mod socketcan;

@@ -65,6 +65,7 @@ pub static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 /// Why bytes are not a usable blob.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BlobError {
     /// Shorter than a header, or than the header says.
     #[error("cut short: {found} bytes where at least {needed} are needed")]

@@ -115,6 +115,7 @@ pub struct Decoder<M: Model> {
     reason = "there is one, in a static, and no heap"
 )]
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(not(feature = "host"), non_exhaustive)]
 pub enum AnyDecoder {
     /// Of Models (12), (15), (30), (31).
     Linear(Decoder<LinearModel>),

@@ -115,6 +115,7 @@ pub trait Model: Copy + Debug + PartialEq + 'static {
 /// The order is part of the blob's layout: add new kinds at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(not(feature = "host"), non_exhaustive)]
 pub enum ModelKind {
     /// Model (12): geometry only.
     M12,
@@ -142,6 +143,7 @@ impl fmt::Display for ModelKind {
 
 /// The coefficients of the three probes, by the model that they belong to.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(not(feature = "host"), non_exhaustive)]
 pub enum Probes<T> {
     /// Models (12), (15), (30) and (31): see [`LinearModel`].
     Linear([Sensitivity<T>; 3]),

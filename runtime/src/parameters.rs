@@ -97,6 +97,7 @@ pub const RANGE_MAX: f32 = 1.0;
 /// What is wrong with a parameter set.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ParameterError {
     /// A number of this group is NaN or infinite.
     #[error("{group} holds a NaN or an infinity")]

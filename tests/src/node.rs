@@ -40,7 +40,7 @@ impl Node {
     /// Never.
     pub fn new(
         serial: Option<&'static str>,
-        key: Option<Key>,
+        key: Option<&'static Key>,
         flash: FlashModel,
         seed: u64,
     ) -> Self {
@@ -49,6 +49,7 @@ impl Node {
                 serial,
                 key,
                 program_version: 0x00_01_02_03,
+                ..Identity::default()
             },
             period: Period::from_us(PERIOD_US).expect("a period"),
             rezero_limits: ZeroOffsetSettings::default(),

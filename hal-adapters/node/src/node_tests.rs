@@ -47,6 +47,7 @@ fn without_a_key_the_servo_counts_as_on_unless_the_line_says_off() {
             serial: None,
             key: None,
             program_version: 1,
+            ..Identity::default()
         };
         let mut node = Node::new(parameters, false, Layout::Bits24, identity, period);
         let facts = Facts {

@@ -26,6 +26,8 @@ pub enum Stop {
     NotKnown = 2,
     /// The blob that ran before the reset is no longer in flash.
     Gone = 3,
+    /// The program in flash differs from its check.
+    ProgramChanged = 4,
 }
 
 /// The state before this start.
@@ -77,6 +79,11 @@ impl Before {
         let before = Self::new(cause, ram.read());
         ram.write(&before.record);
         before
+    }
+
+    /// Runs nothing, whatever ran before.
+    pub const fn stop_by(&mut self, stop: Stop) {
+        (self.stop, self.choice) = (Some(stop), Choice::Nothing);
     }
 
     /// Why nothing runs, after the attempt to load the parameters.

@@ -190,6 +190,11 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
         }
     }
 
+    /// The bus, the pin and the line, for another use.
+    pub fn release(self) -> (SPI, SYNC, READY) {
+        (self.spi, self.sync, self.ready)
+    }
+
     /// One frame: a command and at most one word of data out, the previous command's response in.
     fn exchange(&mut self, command: u16, data: u16) -> Result<Frame, AdcError<SPI::Error>> {
         let mut words = [[0; WORD_BYTES]; WORDS];

@@ -119,6 +119,11 @@ impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> Ads8688<SPI, RST, CLOCK> {
         }
     }
 
+    /// The bus, the pin and the clock, for another use.
+    pub fn release(self) -> (SPI, RST, CLOCK) {
+        (self.spi, self.reset, self.clock)
+    }
+
     /// One frame: 16 bits of command out, the answer in the bytes behind them.
     fn exchange(&mut self, command: u16) -> Result<[u8; FRAME_BYTES], AdcError<SPI::Error>> {
         let [c0, c1] = command.to_be_bytes();

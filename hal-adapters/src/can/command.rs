@@ -22,6 +22,7 @@ use runtime::zero_offset::ZeroOffsetRefusal;
 
 /// A request to a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Request {
     /// Average `ticks` ticks at rest, and subtract the mean from then on; 0 stands for the default of
     /// [`runtime::zero_offset::ZeroOffsetSettings`].

@@ -7,6 +7,7 @@ macro_rules! numbered {
     }) => {
         $(#[$outer])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
         pub enum $name {
             $($(#[$doc])* $variant $(= $number)?,)*

@@ -25,6 +25,8 @@ impl Default for Timing {
 
 /// What is wrong with a frame, or with a source that sends none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BusFault {
     /// Not eight bytes, or a remote frame.
     #[error("{}: {bytes} bytes instead of 8", message.name())]

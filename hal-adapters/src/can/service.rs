@@ -24,7 +24,7 @@ use super::command::{Answer, Command, Content, Mailbox, Outcome, Request};
 use super::frame::Coded;
 use super::notice::BusFault;
 use super::status::flag;
-use super::update::{Nonce, Receiver, Store};
+pub use super::update::Updates;
 use embedded_can::Frame;
 use runtime::zero_offset::{ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{Decode, PlanarPose, PoseTracker};
@@ -36,16 +36,6 @@ pub struct Answered {
     pub command: Command,
     /// Its answer, to be sent.
     pub answer: Option<Coded>,
-}
-
-/// The parts of a node that take new parameters over the bus.
-pub struct Updates<'u, 's> {
-    /// The node's side of an update.
-    pub receiver: &'u mut Receiver<'s>,
-    /// Keeps the records.
-    pub store: &'u mut dyn Store,
-    /// A fresh random number; `None` without a source of any.
-    pub nonce: Option<Nonce>,
 }
 
 /// Obeys commands. It counts time in ticks: call [`Service::tick`] in every one.
@@ -112,25 +102,21 @@ impl Service {
                 let refusal = self.refusal(&command, updates.as_mut());
                 let (outcome, detail) = match (refusal, command.request, &mut updates) {
                     (Some(refusal), ..) => refusal,
-                    (None, Some(Request::Update(request)), Some(updates)) => updates.receiver.obey(
-                        command.token,
-                        request,
-                        self.servo_is_off(),
-                        updates.nonce,
-                        &mut *updates.store,
-                    ),
+                    (None, Some(Request::Update(request)), Some(updates)) => {
+                        updates.obey(command.token, request, self.servo_is_off())
+                    }
                     _ => self.obey(&command, servo),
                 };
-                if let Some(updates) = updates
+                if let Some(updates) = &mut updates
                     && command.needs_authority()
                 {
-                    updates.receiver.note_answer(&command, (outcome, detail));
+                    updates.note_answer(&command, (outcome, detail));
                 }
                 let answer = self.answer(command.number, command.token, outcome, detail);
                 Some(Ok(Answered { command, answer }))
             }
             Ok(Content::UpdateData(data)) => {
-                updates?.receiver.take(&data);
+                updates.as_mut()?.take(&data);
                 None
             }
             Ok(_) => None,
@@ -214,12 +200,10 @@ impl Service {
         if !command.needs_authority() {
             return None;
         }
-        match updates {
-            Some(updates) if updates.receiver.has_key() => {
-                updates.receiver.authorise(command).err()
-            }
-            _ => matches!(self.servo_off_pin, Some(false)).then_some((Outcome::ServoOn, 0)),
-        }
+        let authorised = updates.and_then(|updates| updates.authorise(command));
+        authorised.unwrap_or_else(|| {
+            matches!(self.servo_off_pin, Some(false)).then_some((Outcome::ServoOn, 0))
+        })
     }
 
     fn obey<D: Decode>(

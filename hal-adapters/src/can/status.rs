@@ -62,6 +62,7 @@ pub const fn bit(bit: u32, is: bool) -> u32 {
 
 /// A frame of [`super::Message::NodeStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NodeStatus {
     /// State of the node; `None` for a number that this version does not know.
     pub state: Option<NodeState>,
@@ -108,6 +109,7 @@ impl NodeStatus {
 
 /// Facts about the start and the board of a controller: pages 6 to 11, in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardFacts {
     /// The last fault that caused a reset since power-on. Bits 0 to 7: 0 none, 1 panic, 2 hard
     /// fault, 3 stack overflow, 4 clock failed, 5 watchdog, 6 parameters in RAM changed. Bits 8 to
@@ -154,6 +156,10 @@ pub mod board_check {
     /// The parameters want temperatures, and one is missing or implausible: poses are as if at the
     /// temperature of the calibration.
     pub const TEMPERATURE_MISSING: u32 = 1 << 7;
+    /// The program has no key: whoever can send on the bus may replace its parameters while the servo is off.
+    pub const NO_KEY: u32 = 1 << 8;
+    /// The program was not sealed: nothing shows at start whether its flash has changed.
+    pub const NOT_SEALED: u32 = 1 << 9;
 }
 
 /// One counter of [`runtime::tracker::Health`], or one fact of [`BoardFacts`], with its page.

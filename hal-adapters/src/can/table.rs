@@ -18,6 +18,7 @@ macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident: $id:literal, $key:literal;)*) => {
         /// The messages, by priority on the bus: the lowest identifier wins.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub enum Message {
             $($(#[$doc])* $name,)*
         }

@@ -34,24 +34,37 @@
 //! `Done` of a commit names the stored blob. A host that lost this answer asks which blob is the newest
 //! ([`page::NEXT_CRC`]). To go back, a host reads the blob back before the update, and sends it again.
 //!
-//! **Authority.** The tag ([`tag`]) is AES-CMAC over the nonce, the request with its token, and for a
-//! commit the blob. One nonce serves for one tag, right or wrong, until 5 s without a frame: a recorded tag is worth nothing, and
+//! **Authority.** The tag ([`tag`]) is AES-CMAC over the node's number, the nonce, the request with its token, and for a
+//! commit the blob. One nonce serves for one tag, right or wrong, for 5 s: a recorded or delayed tag is worth nothing, and
 //! each guess takes a challenge. All requests that move the pose, invalidate it or reset the node need a tag
 //! ([`Command::needs_authority`]). Without a key any host on the bus may send them while the line says that
 //! the servo is off: the check of a frame shows damage, not the sender.
 //!
 //! [`Command::needs_authority`]: super::command::Command::needs_authority
 
+#[cfg(feature = "update")]
 mod authentication;
+#[cfg(feature = "update")]
 mod receiver;
 mod request;
+#[cfg(feature = "update")]
 mod staging;
+#[cfg(feature = "update")]
 mod store;
+#[cfg(feature = "update")]
 mod tell;
+#[cfg_attr(not(feature = "update"), path = "update/no_updates.rs")]
+mod updates;
 
+#[cfg(feature = "update")]
 pub use authentication::{Key, Nonce, TAG_BYTES, tag};
+#[cfg(feature = "update")]
 pub use receiver::Receiver;
 pub use request::{UpdateData, UpdateRequest};
+#[cfg(feature = "update")]
 pub use staging::{TAG_INDEX, blob_crc, word_at};
+#[cfg(feature = "update")]
 pub use store::{BlobId, NotWritten, Running, Store};
+#[cfg(feature = "update")]
 pub use tell::{Identity, page};
+pub use updates::Updates;

@@ -31,7 +31,19 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     })?;
     let figures = figures(&identity);
     args.json.write(&figures)?;
-    terminal::print(&as_text(&figures.tables()))
+    terminal::print(&as_text(&figures.tables()))?;
+    warn_without_key(&identity);
+    Ok(())
+}
+
+/// Says what a controller without a key is open to.
+pub(super) fn warn_without_key(identity: &Identity) {
+    if !identity.needs_key {
+        terminal::warn(&[
+            "the controller has no key: whoever can send on its bus may replace its parameters while the servo is off"
+                .to_owned(),
+        ]);
+    }
 }
 
 fn figures(identity: &Identity) -> Group {

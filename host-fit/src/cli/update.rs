@@ -55,6 +55,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
         |talk, progress| on::update(talk, &settings, progress),
     )?;
     terminal::print(&as_text(&updated))?;
+    identify::warn_without_key(&updated.before);
     let (words, transfers) = (updated.repeated_words, updated.repeated_transfers);
     if words + transfers > 0 {
         terminal::warn(&[format!(

@@ -10,7 +10,7 @@ use hal_adapters::adc::thermometer::{Thermometer, ntc_103at, tmp235};
 use hal_adapters::adc::{Channels, FrameSampler};
 use hal_adapters::can::NodeNumber;
 use hal_adapters::can::status::{bit, board_check};
-use hal_adapters::can::update::{Identity, Key};
+use hal_adapters::can::update::Identity;
 use runtime::zero_offset::ZeroOffsetSettings;
 use stage_node::controller::Settings;
 use stage_node::schedule::Period;
@@ -129,7 +129,8 @@ pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
 pub fn settings() -> Settings<'static> {
     let identity = Identity {
         serial: STAGE_SERIAL,
-        key: STAGE_KEY,
+        key: crate::seal::key(),
+        node: STAGE_NODE,
         program_version: PROGRAM_VERSION,
     };
     Settings {
@@ -147,13 +148,6 @@ fn rezero_limits() -> ZeroOffsetSettings {
 
 /// The controller's stage, `STAGE_SERIAL` in the environment of the build: blobs of other stages are refused.
 const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
-
-/// The key of the stage, `STAGE_KEY` in the environment of the build: 32 hexadecimal digits. Without a key every sender
-/// on the bus may replace the parameters while the servo is off.
-const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
-    Some(digits) => Some(key(digits)),
-    None => None,
-};
 
 /// The stage's number on its bus, `STAGE_NODE` in the environment of the build. The default, 0, has the standard
 /// identifiers of the table.
@@ -173,14 +167,6 @@ const PERIOD: Period = match Period::from_us(match option_env!("STAGE_PERIOD_US"
     Some(period) => period,
     None => panic!("STAGE_PERIOD_US is to be 1000 to 10000, and a divisor of 1000000"),
 };
-
-const fn key(digits: &str) -> Key {
-    assert!(digits.len() == 32, "STAGE_KEY needs 32 hexadecimal digits");
-    match u128::from_str_radix(digits, 16) {
-        Ok(number) => number.to_be_bytes(),
-        Err(_) => panic!("STAGE_KEY needs 32 hexadecimal digits"),
-    }
-}
 
 /// Major, minor and patch of the program's version in bits 16 to 23, 8 to 15, 0 to 7.
 const PROGRAM_VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16

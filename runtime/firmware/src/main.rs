@@ -20,7 +20,9 @@ mod bus;
 mod chip;
 mod fault;
 mod flash;
+mod log;
 mod random;
+mod seal;
 mod spi;
 mod start;
 mod supply;
@@ -33,12 +35,13 @@ mod app {
     use super::board::{self, Converter};
     use super::fault::{self, RETAINED};
     use super::timer::{Clock, SETTLED, TICK};
-    use super::{bus::BxCan, chip::Chip, flash, random::Random, start, supply};
+    use super::{bus::BxCan, chip::Chip, flash, random::Random, seal, start, supply};
     use super::{wait::Stopwatch, watchdog::Watchdog};
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::status::{bit, board_check};
     use stage_node::controller::{Controller, Parts};
     use stage_node::retained::Step;
+    use stage_node::start_up::Stop;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
 
@@ -58,13 +61,16 @@ mod app {
         fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
         let mut stopwatch = Stopwatch::new(cx.core.SYST);
-        let before = start::before(&device.RCC);
+        let mut before = start::before(&device.RCC);
         let mut watchdog = Watchdog::start(device.IWDG, &device.DBGMCU, &mut stopwatch);
         // Before anything runs faster or is written.
         supply::wait(&device.PWR, &device.RCC, &mut watchdog, &mut stopwatch);
         let (mut rcc, crystal) = start::clocks(&before, device.RCC, &mut watchdog, &mut stopwatch);
 
         watchdog.feed();
+        if seal::program_has_changed() {
+            before.stop_by(Stop::ProgramChanged);
+        }
         RETAINED.begin(Step::Peripherals);
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let serial = (device.SPI1, device.DMA2);
@@ -74,7 +80,8 @@ mod app {
         let pins = board::set_up(ports, serial, device.CAN1, ready, &mut rcc);
         let can = BxCan::new(pins.can, board::STAGE_NODE, crystal, &mut stopwatch);
         let options = device.FLASH.optcr().read().bits();
-        let checks = pins.not_pulled_up | bit(board_check::INTERNAL_OSCILLATOR, !crystal);
+        let checks =
+            pins.not_pulled_up | seal::checks() | bit(board_check::INTERNAL_OSCILLATOR, !crystal);
         let parts = Parts {
             converter: pins.converter,
             can,

@@ -69,17 +69,19 @@ pub fn clocks(
 
 /// Board and last fault for the health frames. `checks` are bits of [`board_check`]; the brown-out level of
 /// `option_bytes`, the word FLASH_OPTCR, is added.
-pub const fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFacts {
+pub fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFacts {
     let low = bit(
         board_check::BROWN_OUT_LOW,
         option_bytes & BROWN_OUT_LEVEL != 0,
     );
-    BoardFacts {
+    let facts = BoardFacts {
         last_fault: before.record.fault.kind_and_step,
         fault_address: before.record.fault.address,
         fault_detail: before.record.fault.detail,
         faults: before.record.faults,
         option_bytes,
         board_checks: checks | low,
-    }
+    };
+    crate::log::start(&facts);
+    facts
 }

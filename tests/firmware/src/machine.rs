@@ -245,7 +245,11 @@ impl Machine {
 
     /// Flips a bit of RAM.
     pub fn flip(&mut self, address: u32, bit: u32) {
-        if let Some(byte) = self.chip.ram.0.get_mut((address - RAM + bit / 8) as usize) {
+        let (memory, start): (&mut [u8], _) = match address < RAM {
+            true => (&mut self.flash.0, FLASH),
+            false => (&mut self.chip.ram.0, RAM),
+        };
+        if let Some(byte) = memory.get_mut((address - start + bit / 8) as usize) {
             *byte ^= 1 << (bit % 8);
         }
     }

@@ -29,8 +29,8 @@ mod watchdog_model;
 
 use bench::Bench;
 use checks::{
-    authority, bus, commands, figures, log, motion, neighbour, parameters, sensors, start, stopped,
-    temperature, timing, update, zero,
+    authority, bus, commands, figures, log, motion, neighbour, parameters, seal, sensors, start,
+    stopped, temperature, timing, update, zero,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -64,6 +64,7 @@ const CHECKS: &[(&str, Check)] = &named! {
     update: new_parameters, refused, no_nonce_twice, hardware_that_fails, power_cuts;
     stopped: parameters_that_crash;
     authority: tag_or_line;
+    seal: a_changed_program_does_not_run, a_program_without_a_key_says_so, no_copy_of_the_key_is_in_ram;
     neighbour: has_identifiers_and_a_period_of_its_own;
 };
 

@@ -29,8 +29,8 @@ fn run(arguments: &[String]) -> Result<bool, Box<dyn Error>> {
     let (interface, params, serial, key) = match arguments {
         [interface, params, serial] => (interface, params, serial, None),
         [interface, params, serial, key] => {
-            let key = u128::from_str_radix(key, 16)?.to_be_bytes();
-            (interface, params, serial, Some(key))
+            let key = Box::leak(Box::new(u128::from_str_radix(key, 16)?.to_be_bytes()));
+            (interface, params, serial, Some(&*key))
         }
         _ => return Err("use: update_node INTERFACE params.bin SERIAL [KEY]".into()),
     };

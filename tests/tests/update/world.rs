@@ -48,7 +48,7 @@ pub struct World {
 }
 
 impl World {
-    pub fn new(key: Option<Key>, faults: &[(Fault, u64)], seed: u64) -> Self {
+    pub fn new(key: Option<&'static Key>, faults: &[(Fault, u64)], seed: u64) -> Self {
         Self {
             node: Node::new(Some(SERIAL), key, flashed(OLD), seed),
             fifo: VecDeque::new(),

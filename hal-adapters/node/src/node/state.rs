@@ -9,7 +9,7 @@
 //! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive, 11 the instant of the sample is not known (DRDY); 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
 //! | 6 self-test failed | 1: the arithmetic differs from the host's, or the core would not restore the FPU's settings |
 //! | 7 updating | 0: new parameters arrive or are stored; poses are invalid, and no frame comes for up to 0.55 s |
-//! | 8 stopped, until an activation or power-on | 1 the program faulted twice in its first second, 2 the record of the run before the reset is damaged, 3 the blob of that run is no longer in flash |
+//! | 8 stopped, until an activation or power-on | 1 the program faulted twice in its first second, 2 the record of the run before the reset is damaged, 3 the blob of that run is no longer in flash, 4 the program in flash differs from its check |
 
 use crate::records::Loaded;
 use crate::start_up::Stop;

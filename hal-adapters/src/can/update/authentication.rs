@@ -1,13 +1,15 @@
 //! Authority: whoever knows the key of the stage may move the pose, invalidate it, or reset the node.
 //!
-//! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the nonce, the
-//! blob padded with zeros, and a last block of four words. These are the two words of the command
+//! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain with the node's number, the
+//! nonce, the blob padded with zeros, and a last block of four words. These are the two words of the command
 //! ([`Command::payload`], number and token first), the length of the blob in bytes, and its CRC-32C; the last
 //! two are zero for a command without a blob. Words have 32 bits, lowest byte first. CMAC is written here on
 //! the block cipher of a library: over whole blocks it takes a few lines, and they cannot panic. (The crate
 //! `cmac` 0.8.0 can, as the linker shows at opt-level "s".)
 
 use super::staging::blob_crc;
+use super::tell::Identity;
+use crate::can::NodeNumber;
 use crate::can::command::Command;
 use crate::can::e2e::Payload;
 use aes::Aes128Enc;
@@ -25,8 +27,11 @@ pub const TAG_BYTES: usize = BLOCK;
 /// Bytes of a block of AES.
 const BLOCK: usize = 16;
 
-/// First block under every tag: a tag that the same key made for another purpose is not accepted here.
-const DOMAIN: [u8; BLOCK] = *b"hall-requests-v2";
+/// The first words under every tag; the fourth is the node's number. So a tag that the same key made for another purpose
+/// or another node is not accepted.
+const DOMAIN: [u32; 3] = [0x6c6c_6168, 0x6761_742d, 0x0033_762d];
+/// Bytes of the stack that a tag leaves behind: round keys, and what else follows from the key.
+const WIPED_BYTES: usize = 1536;
 
 /// A tag from a host, and the nonce that it must answer.
 #[derive(Clone, Debug)]
@@ -37,11 +42,11 @@ pub(super) struct Tag {
 
 impl Tag {
     /// Whether this is the tag of a command and its blob. Without a key every tag is.
-    pub(super) fn matches(&self, key: Option<&Key>, command: &Command, blob: &[u8]) -> bool {
-        let Some(key) = key else {
+    pub(super) fn matches(&self, identity: &Identity<'_>, command: &Command, blob: &[u8]) -> bool {
+        let Some(key) = identity.key else {
             return true;
         };
-        let own = tag(key, &self.nonce, command, blob);
+        let own = tag(key, identity.node, &self.nonce, command, blob);
         // In constant time.
         u128::from_le_bytes(own) ^ u128::from_le_bytes(self.bytes) == 0
     }
@@ -59,7 +64,7 @@ const fn in_one_block([a, b, c, d]: [u32; 4]) -> u128 {
 
 /// AES-CMAC over whole blocks; `last` is the last one.
 fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_BYTES] {
-    let cipher = Aes128Enc::new(&(*key).into());
+    let cipher = Aes128Enc::new(key.into());
     let chain = blocks.fold(0, |chain, block| encrypt(&cipher, chain ^ block));
     // The subkey K1 is E(0) times x in GF(2^128), most significant bit first.
     let zero = encrypt(&cipher, 0).swap_bytes();
@@ -68,9 +73,36 @@ fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_B
     encrypt(&cipher, chain ^ last ^ k1).to_le_bytes()
 }
 
-/// The tag of a command. `blob` is the blob of a commit, and empty for any other command.
-pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8]) -> [u8; TAG_BYTES] {
-    let head = [u128::from_le_bytes(DOMAIN), in_one_block(*nonce)];
+/// The tag of a command to a node. `blob` is the blob of a commit, and empty for any other command. Leaves nothing of the
+/// key on the stack.
+pub fn tag(
+    key: &Key,
+    node: NodeNumber,
+    nonce: &Nonce,
+    command: &Command,
+    blob: &[u8],
+) -> [u8; TAG_BYTES] {
+    let tag = unwiped_tag(key, node, nonce, command, blob);
+    wipe_stack();
+    tag
+}
+
+/// Overwrites the stack that the function called before has used.
+#[inline(never)]
+fn wipe_stack() {
+    core::hint::black_box(&mut [0u8; WIPED_BYTES]);
+}
+
+#[inline(never)]
+fn unwiped_tag(
+    key: &Key,
+    node: NodeNumber,
+    nonce: &Nonce,
+    command: &Command,
+    blob: &[u8],
+) -> [u8; TAG_BYTES] {
+    let [d0, d1, d2] = DOMAIN;
+    let head = [[d0, d1, d2, node.number()], *nonce].map(in_one_block);
     let padded = blob.chunks(BLOCK).map(|bytes| {
         let mut block = [0; BLOCK];
         for (to, from) in block.iter_mut().zip(bytes) {
@@ -105,8 +137,10 @@ mod tests {
             let blob: std::vec::Vec<u8> = (0..bytes).map(|k| (k * 37) as u8).collect();
             let mut padded = blob.clone();
             padded.resize(blob.len().next_multiple_of(BLOCK), 0);
+            let node = NodeNumber::new(bytes).expect("a node");
             let mut other = Cmac::<aes::Aes128>::new(&key.into());
-            other.update(b"hall-requests-v2");
+            other.update(b"hall-tag-v3\0");
+            other.update(&bytes.to_le_bytes());
             nonce
                 .iter()
                 .for_each(|word| other.update(&word.to_le_bytes()));
@@ -117,16 +151,25 @@ mod tests {
                 other.update(&word.to_le_bytes());
             }
             let want: [u8; 16] = other.finalize().into_bytes().into();
-            assert_eq!(tag(&key, &nonce, &commit(bytes + 1), &blob), want);
+            assert_eq!(tag(&key, node, &nonce, &commit(bytes + 1), &blob), want);
         }
     }
 
     #[test]
     fn no_flipped_bit_of_a_tag_is_accepted() {
-        let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
-        let want = tag(&key, &nonce, &commit(9), &blob);
-        let is_accepted = |bytes| Tag { nonce, bytes }.matches(Some(&key), &commit(9), &blob);
+        let (nonce, blob) = ([1, 2, 3, 4], [5; 100]);
+        let node = NodeNumber::new(5).expect("a node");
+        let identity = Identity {
+            key: Some(&[7; 16]),
+            node,
+            ..Identity::default()
+        };
+        let want = tag(&[7; 16], node, &nonce, &commit(9), &blob);
+        let is_accepted = |bytes| Tag { nonce, bytes }.matches(&identity, &commit(9), &blob);
         assert!(is_accepted(want));
+        // The tag of a request to another node of the same key.
+        let other = tag(&[7; 16], NodeNumber::TABLE, &nonce, &commit(9), &blob);
+        assert!(!is_accepted(other));
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
             assert!(!is_accepted(wrong.to_le_bytes()));

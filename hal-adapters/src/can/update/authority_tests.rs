@@ -4,10 +4,10 @@ use super::*;
 
 #[test]
 fn a_wrong_tag_a_second_guess_and_data_after_the_commit_store_nothing() {
-    let mut bench = Bench::new(Some(KEY));
+    let mut bench = Bench::new(Some(&KEY));
     bench.servo_off();
     bench.transfer(7, NEW, 4);
-    let stale = tag(&KEY, &[0; 4], &committing(4, 7), NEW);
+    let stale = tag(&KEY, NodeNumber::TABLE, &[0; 4], &committing(4, 7), NEW);
     bench.tag(7, stale);
     assert_eq!(bench.update(commit(4), 7), STARTED);
     let refused = (Outcome::NotAuthorised, 0);
@@ -34,7 +34,7 @@ const fn committing(sequence: u32, token: u8) -> Command {
 
 #[test]
 fn without_a_random_number_nothing_can_be_asked_for_that_needs_a_tag() {
-    let mut bench = Bench::new(Some(KEY));
+    let mut bench = Bench::new(Some(&KEY));
     for part in 0..4 {
         let challenge = UpdateRequest::Challenge { part };
         let answered = (bench.receiver).obey(7, challenge, true, None, &mut bench.store);
@@ -43,7 +43,13 @@ fn without_a_random_number_nothing_can_be_asked_for_that_needs_a_tag() {
     }
     bench.tag(
         7,
-        tag(&KEY, &[0; 4], &Command::new(Request::Update(BEGIN), 7), &[]),
+        tag(
+            &KEY,
+            NodeNumber::TABLE,
+            &[0; 4],
+            &Command::new(Request::Update(BEGIN), 7),
+            &[],
+        ),
     );
     assert_eq!(bench.update(BEGIN, 7), NOT_AUTHORISED);
     assert!(!bench.receiver.is_updating());
@@ -65,22 +71,46 @@ const WITH_TAG: [Request; 7] = [
 #[test]
 fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
     for request in WITH_TAG {
-        let mut bench = Bench::new(Some(KEY));
+        let mut bench = Bench::new(Some(&KEY));
         bench.servo_off();
         // Without a tag, and without a challenge.
         assert_eq!(bench.ask(request, 7), NOT_AUTHORISED, "{request:?}");
         // The tag of another token, of another request, and by another key.
         let other = Request::ServoOff { seconds: 254 };
         for wrong in [
-            tag(&KEY, &bench.nonce(), &Command::new(request, 8), &[]),
-            tag(&KEY, &bench.nonce(), &Command::new(other, 7), &[]),
-            tag(&[0; 16], &bench.nonce(), &Command::new(request, 7), &[]),
+            tag(
+                &KEY,
+                NodeNumber::TABLE,
+                &bench.nonce(),
+                &Command::new(request, 8),
+                &[],
+            ),
+            tag(
+                &KEY,
+                NodeNumber::TABLE,
+                &bench.nonce(),
+                &Command::new(other, 7),
+                &[],
+            ),
+            tag(
+                &[0; 16],
+                NodeNumber::TABLE,
+                &bench.nonce(),
+                &Command::new(request, 7),
+                &[],
+            ),
         ] {
             bench.tag(7, wrong);
             assert_eq!(bench.ask(request, 7), NOT_AUTHORISED, "{request:?}");
         }
         // Three of its four words, and then the fourth.
-        let own = tag(&KEY, &bench.nonce(), &Command::new(request, 7), &[]);
+        let own = tag(
+            &KEY,
+            NodeNumber::TABLE,
+            &bench.nonce(),
+            &Command::new(request, 7),
+            &[],
+        );
         for k in 1..4 {
             bench.data(
                 7,
@@ -102,48 +132,31 @@ fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
 }
 
 #[test]
-fn a_nonce_expires_after_five_seconds() {
+fn a_nonce_and_its_tag_expire_after_five_seconds() {
     let off = Request::ServoOff { seconds: 1 };
     for (late, answer) in [(0, DONE), (1, NOT_AUTHORISED)] {
-        let mut bench = Bench::new(Some(KEY));
-        let own = tag(&KEY, &bench.nonce(), &Command::new(off, 7), &[]);
+        let mut bench = Bench::new(Some(&KEY));
+        let own = tag(
+            &KEY,
+            NodeNumber::TABLE,
+            &bench.nonce(),
+            &Command::new(off, 7),
+            &[],
+        );
+        bench.ticks(IDLE_S * TICKS_PER_S - 1);
+        // Frames do not keep it alive.
         bench.tag(7, own);
-        bench.ticks(IDLE_S * TICKS_PER_S + late);
+        bench.ticks(1 + late);
         assert_eq!(bench.ask(off, 7), answer);
     }
 }
 
 #[test]
-fn a_nonce_lives_while_its_host_asks_and_sends() {
-    let off = Request::ServoOff { seconds: 1 };
-    let alive: [fn(&mut Bench); 3] = [
-        |bench| {
-            let again = bench.update(UpdateRequest::Challenge { part: 1 }, 7);
-            assert_eq!(again.0, Outcome::Done);
-        },
-        |bench| bench.data(7, TAG_INDEX, 0),
-        |bench| {
-            let missing = bench.ask(Request::ServoOff { seconds: 1 }, 7);
-            assert_eq!(missing.0, Outcome::Incomplete);
-        },
-    ];
-    for act in alive {
-        let mut bench = Bench::new(Some(KEY));
-        let own = tag(&KEY, &bench.nonce(), &Command::new(off, 7), &[]);
-        bench.ticks(IDLE_S * TICKS_PER_S);
-        act(&mut bench);
-        bench.ticks(IDLE_S * TICKS_PER_S);
-        bench.tag(7, own);
-        assert_eq!(bench.ask(off, 7), DONE);
-    }
-}
-
-#[test]
 fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
-    let mut bench = Bench::new(Some(KEY));
+    let mut bench = Bench::new(Some(&KEY));
     let off = Request::ServoOff { seconds: 1 };
     let nonce = bench.nonce();
-    let recorded = tag(&KEY, &nonce, &Command::new(off, 7), &[]);
+    let recorded = tag(&KEY, NodeNumber::TABLE, &nonce, &Command::new(off, 7), &[]);
     bench.tag(7, recorded);
     assert_eq!(bench.ask(off, 7), DONE);
     assert!(bench.service.servo_is_off());

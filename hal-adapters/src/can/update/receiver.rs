@@ -9,7 +9,7 @@ use crate::can::command::{Answer, Command, Outcome, Request};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
-/// A transfer without a frame for this time is closed, and a nonce of a host that is silent expires, s.
+/// A transfer without a frame for this time is closed, and so old a nonce, and every tag for it, expires, s.
 const IDLE_S: u32 = 5;
 
 /// An open transfer.
@@ -39,7 +39,7 @@ pub struct Receiver<'s> {
     idle_ticks_max: u32,
     staging: Staging,
     transfer: Option<Transfer>,
-    /// The nonce of the next tag: asked for and not used yet, and the time since the host was last heard of it.
+    /// The nonce of the next tag: asked for and not used yet, and its age.
     nonce: Option<Nonce>,
     nonce_ticks: u32,
     /// The last command with a right tag, and its answer, until the next challenge.
@@ -98,13 +98,12 @@ impl<'s> Receiver<'s> {
             return refused;
         };
         if let Some(index) = self.staging.missing(0, true) {
-            self.nonce_ticks = 0;
             return Err((Outcome::Incomplete, index.into()));
         }
         self.nonce = None;
         let bytes = self.staging.tag();
         let tag = Tag { nonce, bytes };
-        match tag.matches(self.identity.key.as_ref(), command, &[]) {
+        match tag.matches(&self.identity, command, &[]) {
             true => Ok(()),
             false => refused,
         }
@@ -127,7 +126,6 @@ impl<'s> Receiver<'s> {
             transfer.idle_ticks = 0;
             transfer.bytes
         });
-        self.nonce_ticks = 0;
         self.staging.put(data.index, data.word, bytes);
     }
 
@@ -210,7 +208,7 @@ impl<'s> Receiver<'s> {
         let blob = self.staging.blob(transfer.bytes);
         let request = Request::Update(UpdateRequest::Commit { sequence });
         let command = Command::new(request, transfer.token);
-        if !tag.matches(self.identity.key.as_ref(), &command, blob) {
+        if !tag.matches(&self.identity, &command, blob) {
             return Some((Outcome::NotAuthorised, 0));
         }
         if let Err(error) = check(blob, self.identity.serial) {
@@ -226,9 +224,9 @@ impl<'s> Receiver<'s> {
     fn challenge(&mut self, part: u8, nonce: Option<Nonce>) -> (Outcome, u32) {
         if part == 0 {
             (self.nonce, self.answered) = (nonce, None);
+            self.nonce_ticks = 0;
             self.staging.clear_tag();
         }
-        self.nonce_ticks = 0;
         let drawn = self.nonce.as_ref();
         match (drawn.and_then(|words| words.get(usize::from(part))), part) {
             (Some(word), _) => (Outcome::Done, *word),

@@ -4,7 +4,7 @@ use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_a
 use super::*;
 use crate::can::command::{Command, Content, Mailbox, Request};
 use crate::can::service::{Service, Updates};
-use crate::can::{BusFrame, Coded};
+use crate::can::{BusFrame, Coded, NodeNumber};
 use std::vec::Vec;
 
 const TICKS_PER_S: u32 = 500;
@@ -64,11 +64,12 @@ impl Store for Watched {
 }
 
 impl Bench {
-    fn new(key: Option<Key>) -> Self {
+    fn new(key: Option<&'static Key>) -> Self {
         let identity = Identity {
             serial: Some(SERIAL),
             key,
             program_version: 0x010203,
+            ..Identity::default()
         };
         Self {
             service: Service::new(TICKS_PER_S),
@@ -125,7 +126,16 @@ impl Bench {
     fn ask_tagged(&mut self, request: Request, token: u8) -> (Outcome, u32) {
         if self.receiver.has_key() {
             let nonce = self.nonce();
-            self.tag(token, tag(&KEY, &nonce, &Command::new(request, token), &[]));
+            self.tag(
+                token,
+                tag(
+                    &KEY,
+                    NodeNumber::TABLE,
+                    &nonce,
+                    &Command::new(request, token),
+                    &[],
+                ),
+            );
         }
         self.ask(request, token)
     }
@@ -203,7 +213,7 @@ impl Bench {
             assert_eq!(self.update(commit(sequence), token), incomplete);
         }
         let command = Command::new(Request::Update(commit(sequence)), token);
-        self.tag(token, tag(&KEY, &nonce, &command, blob));
+        self.tag(token, tag(&KEY, NodeNumber::TABLE, &nonce, &command, blob));
     }
 }
 

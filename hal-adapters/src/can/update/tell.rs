@@ -3,15 +3,19 @@
 use super::authentication::Key;
 use super::staging::word_at;
 use super::store::Store;
+use crate::can::NodeNumber;
 use crate::can::command::Outcome;
 
 /// What a node knows of itself.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Identity<'s> {
     /// The stage's serial number: a blob of another stage is refused. `None` accepts any.
     pub serial: Option<&'s str>,
-    /// The stage's key; `None`: whoever can send on the bus may update.
-    pub key: Option<Key>,
+    /// The stage's key, where it lies in flash: no copy of it stays in RAM. `None`: whoever can send on the bus may
+    /// update.
+    pub key: Option<&'s Key>,
+    /// Its number on the bus.
+    pub node: NodeNumber,
     /// Version of the program: major, minor, patch in bits 16 to 23, 8 to 15, 0 to 7.
     pub program_version: u32,
 }

@@ -35,7 +35,7 @@ fn what_cannot_be_stored_is_refused_by_kind() {
         (NEW, Some(NotWritten::Failed), (Outcome::StoreFailed, 0)),
         (NEW, Some(NotWritten::SupplyLow), (Outcome::SupplyLow, 0)),
     ] {
-        let mut bench = Bench::new(Some(KEY));
+        let mut bench = Bench::new(Some(&KEY));
         bench.store.fails = fails;
         bench.servo_off();
         bench.transfer(7, blob, 4);
@@ -55,7 +55,7 @@ fn what_cannot_be_stored_is_refused_by_kind() {
 /// What the pages say, a host reads: `tests/update`.
 #[test]
 fn a_page_or_a_word_that_is_not_there_is_refused() {
-    let mut bench = Bench::new(Some(KEY));
+    let mut bench = Bench::new(Some(&KEY));
     let tell = |bench: &mut Bench, page| bench.update(UpdateRequest::Tell { page }, page);
     let read = |bench: &mut Bench, index| bench.update(UpdateRequest::ReadBack { index }, 1);
     let (none, unknown) = ((Outcome::NoParameters, 0), (Outcome::UnknownCommand, 0));

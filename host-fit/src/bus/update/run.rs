@@ -3,7 +3,7 @@
 use super::{Link, Talk, UpdateError, UpdateRunError};
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
-use hal_adapters::can::{BusFrame, Message};
+use hal_adapters::can::{BusFrame, Message, NodeNumber};
 use hallstage_input::watch::Watch;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
@@ -20,6 +20,7 @@ fn now_token() -> u8 {
 /// A CAN interface as a link.
 pub struct Interface<'s> {
     bus: Bus,
+    node: NodeNumber,
     started: Instant,
     stop: &'s AtomicBool,
 }
@@ -41,6 +42,10 @@ impl Link for Interface<'_> {
         let wait = Duration::from_micros(until_us.saturating_sub(self.now_us()));
         let received = self.bus.receive(wait).map_err(broken)?;
         Ok(received.map(|stamped| stamped.frame))
+    }
+
+    fn node(&self) -> NodeNumber {
+        self.node
     }
 
     fn now_us(&self) -> u64 {
@@ -65,6 +70,7 @@ pub fn talk_to<T>(
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
         bus: Bus::open(&address.interface, address.node, &[Message::Answer])?,
+        node: address.node,
         started: Instant::now(),
         stop: watch.stop,
     };

@@ -198,8 +198,10 @@ impl<L: Link> Script<'_, L> {
             (self.progress)(sent, words.len() as u64);
         }
         if let Some(key) = &key {
+            // The whole blob first: its tag expires after 5 s.
+            self.repeated_words += self.talk.exchange_words(token, commit, &words)?.1;
             let command = Command::new(commit, token);
-            words.extend(self.talk.authorise(key, &command, blob)?);
+            words = self.talk.authorise(key, &command, blob)?;
         }
         // From here on the node may store the blob, within a second.
         self.talk.may_stop = false;

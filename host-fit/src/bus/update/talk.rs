@@ -1,9 +1,9 @@
 //! Requests and their answers over a bus that may lose either.
 
 use super::UpdateError;
-use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_at};
+use hal_adapters::can::{BusFrame, NodeNumber};
 
 /// From frame to frame, us. A controller stores three received frames and reads them every 2 ms. At one frame
 /// in a millisecond none is lost, even to a tick that is late.
@@ -36,6 +36,11 @@ pub trait Link {
     /// # Errors
     /// [`UpdateError::Link`] if the bus cannot be used.
     fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError>;
+
+    /// The node that answers.
+    fn node(&self) -> NodeNumber {
+        NodeNumber::TABLE
+    }
 
     /// Time since some moment, us.
     fn now_us(&self) -> u64;
@@ -153,7 +158,8 @@ impl<L: Link> Talk<L> {
         Ok((Outcome::NotAuthorised, 0))
     }
 
-    /// The answer to a request that follows these words, and the number of lost words, which are sent again.
+    /// The answer to a request that follows these words, and the number of lost words, which are sent again. "Incomplete" if
+    /// other words are missing.
     pub(super) fn exchange_words(
         &mut self,
         token: u8,
@@ -165,9 +171,10 @@ impl<L: Link> Talk<L> {
             let (Outcome::Incomplete, index) = answer else {
                 return Ok((answer, lost));
             };
-            for word in words.iter().filter(|word| u32::from(word.index) == index) {
-                self.send_word(*word)?;
-            }
+            let Some(word) = words.iter().find(|word| u32::from(word.index) == index) else {
+                return Ok((answer, lost));
+            };
+            self.send_word(*word)?;
         }
         Err(UpdateError::Lossy)
     }
@@ -182,7 +189,8 @@ impl<L: Link> Talk<L> {
         command: &Command,
         blob: &[u8],
     ) -> Result<Vec<UpdateData>, UpdateError> {
-        let tag = tag(key, &self.nonce()?, command, blob);
+        let nonce = self.nonce()?;
+        let tag = tag(key, self.link.node(), &nonce, command, blob);
         let words = words(command.token, &tag, TAG_INDEX);
         words.iter().try_for_each(|word| self.send_word(*word))?;
         Ok(words)

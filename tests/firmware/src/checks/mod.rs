@@ -9,6 +9,7 @@ pub mod log;
 pub mod motion;
 pub mod neighbour;
 pub mod parameters;
+pub mod seal;
 pub mod sensors;
 pub mod start;
 pub mod stopped;

@@ -92,8 +92,9 @@ impl Store for Nowhere {
 fn update(frame: &BusFrame) {
     let identity = Identity {
         serial: black_box(Some("HS-0007")),
-        key: black_box(Some([0; 16])),
+        key: black_box(Some(&[0; 16])),
         program_version: 1,
+        ..Identity::default()
     };
     let (mut service, mut receiver) = (Service::new(500), Receiver::new(identity, 500));
     let store = &mut Nowhere;

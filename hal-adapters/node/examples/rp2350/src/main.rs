@@ -91,6 +91,7 @@ fn main() -> ! {
             serial: option_env!("STAGE_SERIAL"),
             key: None,
             program_version: 0x00_02_00,
+            ..Identity::default()
         },
         period: const { Period::from_us(2000).expect("a period") },
         rezero_limits: ZeroOffsetSettings::default(),
