@@ -32,7 +32,7 @@ pub use known::{StoredPosterior, own_logs};
 use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
-use crate::fit::calibration;
+use crate::fit::{RANGE_MARGIN, calibration};
 use crate::judge::in_motion::by_lags;
 use crate::judge::predicted::{Predicted, Validity, declared_service};
 use crate::judge::{Decoded, Judgement, Zeros};
@@ -45,6 +45,7 @@ use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
 use hallstage_solver::estimator::noise::USUAL_DRIFT;
 use hallstage_solver::estimator::parameters::FieldParameters;
+use hallstage_solver::estimator::service::{Service, service_poses};
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::update::{Change, update};
 use runtime::calibration::Origin;
@@ -180,8 +181,20 @@ pub fn recalibrate(
     )?;
     let at_work = declared_service(stage, &update.parameters, update.noise.white_m);
     let at_work = at_work.ok_or(FieldFitError::Singular)?;
-    let service = at_work.variance(&update.posterior.covariance);
-    let open_before = covariance.map_or([0.0; 3], |of| at_work.variance(of).systematic);
+    // Whether the log determines the change: over the whole calibrated range.
+    let range = |words: [f32; 3]| words.map(|x| f64::from(x) / RANGE_MARGIN);
+    let ranges = (
+        range(old.constants.calibrated_planar),
+        range(old.constants.calibrated_vertical),
+    );
+    let calibrated = Service::new(
+        &update.parameters,
+        update.noise.white_m,
+        service_poses(ranges),
+    );
+    let calibrated = calibrated.ok_or(FieldFitError::Singular)?;
+    let service = calibrated.variance(&update.posterior.covariance);
+    let open_before = covariance.map_or([0.0; 3], |of| calibrated.variance(of).systematic);
     let open_max = match change {
         Change::Gain | Change::Gains => OPEN_MAX_GAINS,
         Change::All | Change::Temperature => OPEN_MAX_ALL,
