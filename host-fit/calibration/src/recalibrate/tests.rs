@@ -223,8 +223,11 @@ fn a_log_or_an_excerpt_is_no_evidence_if_any_fit_before_has_used_it() {
         |known: Option<&StoredPosterior>, log: &Dataset| !own_logs(&set, known, log).is_empty();
     // Rows of a log as another log, re-zeroed and with other times.
     let part = |log: &Dataset, first: usize, every: usize| {
-        let mut part = Dataset::default();
-        part.rows = log.rows[first..].iter().step_by(every).copied().collect();
+        let rows = log.rows[first..].iter().step_by(every);
+        let mut part = Dataset {
+            rows: rows.copied().collect(),
+            ..Dataset::default()
+        };
         part.rows
             .iter_mut()
             .for_each(|row| row.t_us -= log.rows[first].t_us);
