@@ -70,6 +70,7 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::terms::COUNT;
 pub use limits::ERROR_TO_NOISE_MAX;
 use runtime::{ModelKind, ParameterSet};
+use std::borrow::Cow;
 
 /// The faults of a log, and the verdict on its calibration.
 #[derive(Clone, Debug, Default)]
@@ -106,6 +107,11 @@ pub fn diagnose_log(
     let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
+    let outliers = fitted.map_or_else(|_| Vec::new(), |fit| fit.fitted.outliers().collect());
+    let without_outliers = match outliers.as_slice() {
+        [] => Cow::Borrowed(dataset),
+        outliers => Cow::Owned(dataset.without(outliers)),
+    };
     let designed = || FieldParameters::from_model_31(&Parameters::designed(stage), stage);
     let own = fitted.map_or_else(|_| designed(), |fit| fit.estimate.parameters);
     let mut out = Diagnosis {
@@ -134,7 +140,7 @@ pub fn diagnose_log(
     };
     let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
     let described = (is_described, estimate);
-    let found = out.add_faults(dataset, stage, by, described);
+    let found = out.add_faults(dataset, &without_outliers, stage, by, described);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
         Err(_) => out.predicted = None,
@@ -208,6 +214,7 @@ impl Diagnosis {
     fn add_faults(
         &mut self,
         dataset: &Dataset,
+        without_outliers: &Dataset,
         stage: &Stage,
         by: Calibrated,
         (is_described, estimate): (bool, Option<&Estimate>),
@@ -216,9 +223,8 @@ impl Diagnosis {
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
         let has_channels = is_described && dataset.logs.iter().all(|log| log.has_reference);
-        let sound = &dataset.without(&bad);
-        let of_rows = has_channels.then(|| find_faults(sound, stage, by, is_bent));
-        let of_rows = of_rows.flatten();
+        let rows = has_channels.then(|| find_faults(&dataset.without(&bad), stage, by, is_bent));
+        let of_rows = rows.flatten();
         // A repair that leads to residuals of noise explains the log, but not a drawing that it contradicts.
         let explains = |of: &&Faults| of.repair.is_some() && of.residual < LIMITED_MAX;
         let repaired = of_rows
@@ -236,7 +242,7 @@ impl Diagnosis {
             (None, Some(own)) if !is_bent => Some((&own.parameters, &own.posterior.covariance)),
             _ => None,
         };
-        let mistake = structure::structure(sound, stage, disagree, known);
+        let mistake = structure::structure(without_outliers, stage, disagree, known);
         let stands_alone = |found: &Finding| {
             repaired.is_none() || matches!(found.kind, Kind::Mistake { is_sure: true, .. })
         };
@@ -339,7 +345,7 @@ pub fn diagnose_blob(
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
     };
-    out.add_faults(dataset, stage, by, (true, None));
+    out.add_faults(dataset, dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     out.findings
