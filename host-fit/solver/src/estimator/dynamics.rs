@@ -8,7 +8,7 @@
 use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::whiten::{ACCELERATIONS, LAG, PROBE_LAGS};
-use nalgebra::{Cholesky, Const, DMatrix, Matrix2, Matrix3, SMatrix, Vector3};
+use nalgebra::{Cholesky, Const, DMatrix, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 use runtime::MotionCorrection;
 use runtime::matrix::{from_rows, inverse};
 use std::array::from_fn;
@@ -19,6 +19,8 @@ pub const ARM_M: f64 = 0.25;
 pub const ARMS_M: [f64; 6] = [1.0, 1.0, ARM_M, 1.0, ARM_M, ARM_M];
 /// Standard deviation of the lag of a probe behind the others before a log is seen, s.
 pub const PROBE_LAG_S: f64 = 1e-3;
+/// The same of a probe in time: a converter's sample whose instant is not known to this is refused, s.
+const IN_TIME_S: f64 = 10e-6;
 /// Standard deviation of a reading's change by acceleration before a log is seen, m per m/s2. A motor coil 5 cm away has
 /// 7e-6, an arm with a resonance at 120 Hz 1e-6 to 4e-6.
 pub const PER_ACCELERATION: f64 = 3e-6;
@@ -176,6 +178,35 @@ impl MotionFit {
         })
     }
 
+    /// Second moment of the lags of A, B, C in service, s2. The probes are late, or all in time: even odds, and the
+    /// evidence of the log. So a log that hardly moves does not count as a log of late probes.
+    fn lag_moment(&self) -> Matrix3<f64> {
+        let moment = |covariance: Matrix3<f64>, lags_s: [f64; 3]| {
+            let lags_s = Vector3::from(lags_s);
+            covariance + lags_s * lags_s.transpose()
+        };
+        let late = moment(self.probe_lag_covariance, self.lags_behind_middle_s());
+        let known: Matrix2<f64> = self.probe_lag_covariance.fixed_view::<2, 2>(0, 0).into();
+        let Some(known) = known.cholesky() else {
+            return late;
+        };
+        let [a, b, _] = self.dynamics.probe_lag_s;
+        let lags = Vector2::new(a, b);
+        let prior = lag_prior().inverse();
+        let narrow = prior * (PROBE_LAG_S / IN_TIME_S).powi(2);
+        let Some(in_time) = (known.inverse() - prior + narrow).cholesky() else {
+            return late;
+        };
+        let weighted = known.solve(&lags);
+        let left = in_time.solve(&weighted);
+        let squares = lags.dot(&weighted) - left.dot(&weighted);
+        let widths = known.determinant() * prior.determinant() * in_time.determinant();
+        let odds = (widths / narrow.determinant()).sqrt() * libm::exp(0.5 * squares);
+        let is_late = 1.0 - 1.0 / (1.0 + odds);
+        let [a, b] = left.into();
+        late * is_late + moment(three_lags(in_time.inverse()), [a, b, -a - b]) * (1.0 - is_late)
+    }
+
     /// Variances that motion adds to X, Y, Rz in service (m2, m2, rad2): speeds and accelerations of the axes are
     /// independent. The correction leaves the errors of the fit. `None` where the probes do not determine the pose.
     pub fn variance(
@@ -196,7 +227,10 @@ impl MotionFit {
             let k = second_moment(self.acceleration_covariance[axis], known);
             sum += poses * k * poses.transpose() * (ARMS_M[axis] * acceleration).powi(2);
         }
-        let lags = second_moment(self.probe_lag_covariance, self.lags_behind_middle_s());
+        let lags = match is_corrected {
+            true => self.probe_lag_covariance,
+            false => self.lag_moment(),
+        };
         for (axis, speed) in motion.speed.into_iter().enumerate() {
             // J^-1 diag(J v): what a lag of each probe does to the pose.
             let by_lag = poses * Matrix3::from_diagonal(&readings.column(axis).into_owned());
@@ -230,4 +264,24 @@ fn jacobian(parameters: &FieldParameters) -> Option<(Matrix3<f64>, Matrix3<f64>)
     let probes = probes(parameters);
     let readings = from_rows(&probes.map(|probe| probe.read([0.0; 3], [0.0; 3]).by_pose));
     Some((readings, inverse(&readings)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lags of which the log leaves this deviation, against their squares alone.
+    fn counted(deviation_s: f64) -> f64 {
+        let covariance = Matrix2::identity() * deviation_s.powi(2);
+        let fit = MotionFit::with_probe_lags([4e-4, -2e-4], covariance);
+        fit.lag_moment()[(0, 0)] / 6e-4_f64.powi(2)
+    }
+
+    #[test]
+    fn lags_that_a_log_shows_count_in_full_and_others_little() {
+        assert!((counted(1e-5) - 1.0).abs() < 1e-3);
+        assert!(counted(3e-4) < 0.5);
+        let in_time = MotionFit::with_probe_lags([0.0; 2], Matrix2::identity() * 1e-10);
+        assert!(in_time.lag_moment()[(0, 0)] < 1e-10);
+    }
 }
