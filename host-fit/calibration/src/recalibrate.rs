@@ -27,7 +27,7 @@ mod described;
 mod known;
 
 use described::check_described;
-pub use known::{StoredPosterior, own_logs};
+pub use known::{Certificates, StoredPosterior, own_logs};
 
 use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
@@ -256,6 +256,7 @@ pub fn recalibrate(
             covariance: update.posterior.covariance.clone(),
             noise: update.noise,
             budget: diagnosis.budget.clone(),
+            certificates: known.certificates.clone().next(),
             ..known.clone().with_logs(dataset)
         }),
         gains,

@@ -163,7 +163,7 @@ impl Evaluation {
             operator,
             notes: notes.unwrap_or_default(),
             created,
-            certificate: &of.certificate,
+            certificates: of.certificates.clone(),
             call: vec!["hallstage".into(), "Calibration.evaluate".into()],
         };
         let stage_file = self.stage.get().path.as_ref();

@@ -13,6 +13,7 @@ use crate::work;
 use host_fit::calibrate::Updated;
 use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::judge::Judgement;
+use host_fit::calibration::recalibrate::Certificates;
 use host_fit::calibration::words;
 use host_fit::report::page::CERTIFICATE;
 use host_fit::solver::estimator::update::Change;
@@ -191,7 +192,7 @@ impl Calibration {
             operator,
             notes: notes.unwrap_or_default(),
             created: &self.set.created,
-            certificate: "",
+            certificates: Certificates::default(),
             call: vec!["hallstage".into(), "fit".into()],
         };
         let blob = self.blob_bytes()?;

@@ -3,6 +3,7 @@
 use crate::error::{internal, output_error, wrong};
 use crate::held::rows_of_three;
 use host_fit::calibration::judge::Judgement;
+use host_fit::calibration::recalibrate::Certificates;
 use host_fit::calibration::words::{message, python};
 use host_fit::input::axis::AXES;
 use host_fit::input::dataset::Dataset;
@@ -90,8 +91,8 @@ pub struct About<'a> {
     pub operator: Option<&'a str>,
     pub notes: BTreeMap<String, String>,
     pub created: &'a str,
-    /// The number of the certificate of the calibration that was judged; empty without one.
-    pub certificate: &'a str,
+    /// The certificates of the calibration that was judged, and of those before it.
+    pub certificates: Certificates,
     /// The call that led to it, in words.
     pub call: Vec<OsString>,
 }
@@ -124,7 +125,7 @@ pub fn write(
         warnings,
         report: Some(report),
         as_found: None,
-        certificate: about.certificate.to_owned(),
+        certificates: about.certificates,
     };
     let html = source.html().map_err(internal)?;
     if path.is_dir() {

@@ -12,7 +12,7 @@ use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
-use hallstage_calibration::recalibrate::{StoredPosterior, own_logs};
+use hallstage_calibration::recalibrate::{Certificates, StoredPosterior, own_logs};
 use hallstage_calibration::words;
 use hallstage_input::axis::{Axis, PLANAR};
 use hallstage_input::dataset::Dataset;
@@ -61,8 +61,8 @@ pub struct Evaluation {
     pub refusal: Option<Refusal>,
     /// The logs that the blob was fitted to: they verify nothing.
     pub own_logs: Vec<String>,
-    /// The number of the certificate of the blob; empty without one.
-    pub certificate: String,
+    /// The certificates of the blob, and of those before it.
+    pub certificates: Certificates,
 }
 
 impl Evaluation {
@@ -154,7 +154,8 @@ impl Evaluation {
         }
         Ok(Self {
             refusal,
-            certificate: known.map_or(String::new(), |known| known.certificate.clone()),
+            certificates: known
+                .map_or_else(Certificates::default, |known| known.certificates.clone()),
             own_logs: own_logs(set, known, &log.dataset),
             set: set.clone(),
             stage: stage.clone(),

@@ -114,7 +114,7 @@ pub(super) fn add_page(
         let bytes = blob_file::to_bytes(blob, &report.set)?;
         let provenance = &mut source.provenance;
         provenance.add_bytes(blob, &bytes, "parameter blob, judged");
-        source.certificate.clone_from(&evaluation.certificate);
+        source.certificates.clone_from(&evaluation.certificates);
         source.warnings.clone_from(&report.warnings);
         source.report = Some(report);
         Ok(source.html()?)

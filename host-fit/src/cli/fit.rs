@@ -89,6 +89,8 @@ impl FitJob<'_> {
         let kept = self.out.filter(|_| outcome.has_blob);
         let kept = kept.zip(outcome.fitted.as_ref().ok());
         let mut known = outcome.known(&log.dataset);
+        let certificates = kept.map(|(path, fit)| kept::certificates(path, &fit.set));
+        let mut certificates = certificates.unwrap_or_default();
         page.add(&mut outputs, || {
             let what = (self.title, self.order.settings.serial.as_str());
             let mut source = page.source(what, logs, log_and_stage, subject);
@@ -101,13 +103,16 @@ impl FitJob<'_> {
                 let blob = blob_file::to_bytes(path, &fit.set)?;
                 let provenance = &mut source.provenance;
                 provenance.add_bytes(path, &blob, "parameter blob, written");
-                source.certificate = kept::certificate(path, &fit.set);
             }
-            if let (Some(known), Some(number)) = (&mut known, source.number()) {
-                known.certificate = number;
+            source.certificates = certificates.clone();
+            if let Some(number) = source.number() {
+                certificates = std::mem::take(&mut certificates).with(number);
             }
             Ok(source.html()?)
         })?;
+        if let Some(known) = &mut known {
+            known.certificates = certificates;
+        }
         if let Some((path, fit)) = kept {
             posterior_file::add_calibration(&mut outputs, path, &fit.set, known.as_ref())?;
         }

@@ -13,7 +13,7 @@ use crate::report::text::as_text;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::diagnose::refusal::Refusal;
-use hallstage_calibration::recalibrate::{RecalibrateError, StoredPosterior};
+use hallstage_calibration::recalibrate::{Certificates, RecalibrateError, StoredPosterior};
 use hallstage_input::log::ReadOptions;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -104,13 +104,14 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         source.warnings.clone_from(&updated.warnings);
         source.report = Some(&report);
         source.as_found = Some(as_found);
-        let before = blob.1.map(|known| known.certificate.clone());
-        source.certificate = before.unwrap_or_default();
+        let known = updated.new.known.as_ref();
+        source.certificates =
+            known.map_or_else(Certificates::default, |of| of.certificates.clone());
         number = source.number();
         Ok(source.html()?)
     })?;
     if let (Some(known), Some(number)) = (&mut updated.new.known, number) {
-        known.certificate = number;
+        known.certificates = std::mem::take(&mut known.certificates).with(number);
     }
     if updated.refusal.is_none() {
         let (set, known) = (&updated.new.set, updated.new.known.as_ref());

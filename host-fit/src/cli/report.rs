@@ -10,6 +10,7 @@ use crate::report::table::Table;
 use crate::report::verdict::{Subject, Summary};
 use crate::trend;
 use clap::Args;
+use hallstage_calibration::recalibrate::Certificates;
 use hallstage_calibration::words;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
@@ -76,7 +77,7 @@ impl ReportArgs {
             warnings: words::messages(&log.warnings),
             report: None,
             as_found: None,
-            certificate: String::new(),
+            certificates: Certificates::default(),
         }
     }
 

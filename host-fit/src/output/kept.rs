@@ -3,6 +3,7 @@
 use super::error::{OutputError, OutputProblem};
 use super::{blob_file, posterior_file};
 use flate2::read::MultiGzDecoder;
+use hallstage_calibration::recalibrate::Certificates;
 use runtime::ParameterSet;
 use std::fs::File;
 use std::io::Read;
@@ -52,11 +53,13 @@ pub fn check_own_blob(path: &Path, serial: &str) -> Result<(), OutputError> {
     }
 }
 
-/// The number of the certificate of another blob than this one that is there; empty without one.
-pub fn certificate(path: &Path, set: &ParameterSet) -> String {
-    let there = blob_file::read(path).ok().filter(|there| there != set);
+/// The certificates of a blob that takes the place of the one that is there: where it is the same one, it keeps its own.
+pub fn certificates(path: &Path, set: &ParameterSet) -> Certificates {
+    let there = blob_file::read(path).ok();
+    let is_same = there.as_ref() == Some(set);
     let known = there.and_then(|there| posterior_file::read(&there, path).ok()?);
-    known.map_or(String::new(), |known| known.certificate)
+    let there = known.map(|known| known.certificates).unwrap_or_default();
+    if is_same { there } else { there.next() }
 }
 
 /// The first bytes of a file, unpacked; none of devices and pipes.

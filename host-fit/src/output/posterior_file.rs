@@ -1,6 +1,6 @@
 //! The posterior of a fit as a file beside its blob: the prior of a recalibration.
 //!
-//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS3` in ASCII, the fields of `Content` in postcard,
+//! `params.bin.posterior` stands beside `params.bin`: the magic `HALLPOS4` in ASCII, the fields of `Content` in postcard,
 //! and the SHA-256 of all before it.
 
 use crate::output::file::is_stream;
@@ -15,7 +15,7 @@ use runtime::ParameterSet;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8] = b"HALLPOS3";
+const MAGIC: &[u8] = b"HALLPOS4";
 /// Rows of the covariance without and with k and h.
 const ROWS: [usize; 2] = [COUNT, COUNT + 6];
 /// Largest file that is read.
@@ -148,7 +148,7 @@ pub fn to_bytes(blob: &[u8], known: &StoredPosterior) -> Vec<u8> {
 /// What is wrong with the file.
 pub fn from_bytes(bytes: &[u8]) -> Result<([u8; 32], StoredPosterior), String> {
     let Some(start) = bytes.strip_prefix(MAGIC) else {
-        return Err("it does not begin with HALLPOS3".to_owned());
+        return Err("it does not begin with HALLPOS4".to_owned());
     };
     let parts = start.split_last_chunk::<32>();
     let (content, hash) = parts.ok_or("it is cut")?;
@@ -193,6 +193,7 @@ fn is_covariance(matrix: &DMatrix<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hallstage_calibration::recalibrate::Certificates;
 
     fn known() -> StoredPosterior {
         known_with_rows(COUNT)
@@ -213,7 +214,10 @@ mod tests {
             budget: None,
             up_to: None,
             marks: vec![3],
-            certificate: "7".to_owned(),
+            certificates: Certificates {
+                own: "7".to_owned(),
+                before: vec!["6".to_owned()],
+            },
         }
     }
 

@@ -15,6 +15,7 @@ use super::verdict::{End, Subject, Summary};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::{PoseError, white_noise};
 use hallstage_calibration::judge::verdict::Verdict;
+use hallstage_calibration::recalibrate::Certificates;
 use hallstage_calibration::words;
 use hallstage_input::axis::{AXES, Axis, counted, sign};
 use hallstage_input::dataset::Dataset;
@@ -53,8 +54,8 @@ pub struct Source<'a> {
     pub report: Option<&'a Report>,
     /// The calibration before it was brought up to date.
     pub as_found: Option<AsFound>,
-    /// The number of the certificate of the blob that was judged, brought up to date or replaced; empty without one.
-    pub certificate: String,
+    /// The certificates of the blob, and of those before it.
+    pub certificates: Certificates,
 }
 
 /// A calibration before it was brought up to date.
@@ -152,7 +153,7 @@ impl Source<'_> {
             .iter()
             .filter_map(|(text, name)| is_open(text).then_some(*name));
         let [number, ..] = &self.stage.certificate.texts;
-        let is_taken = !number.is_empty() && *number == self.certificate;
+        let is_taken = !number.is_empty() && self.certificates.has(number);
         let taken = is_taken.then_some("a number of its own");
         texts.chain(open).chain(taken).collect()
     }
@@ -175,9 +176,18 @@ impl Source<'_> {
                 ["number".to_owned(), self.provenance.document(&self.facts)],
             );
         }
-        if !self.certificate.is_empty() {
-            let name = "latest certificate before".to_owned();
-            facts.insert(1, [name, self.certificate.clone()]);
+        let Certificates { own, before } = &self.certificates;
+        let of_blob = "certificate of the blob";
+        let fact = match (self.title == CERTIFICATE, before.last()) {
+            (true, before) => before.map(|of| ["latest certificate before", of].map(str::to_owned)),
+            (false, _) if !own.is_empty() => Some([of_blob, own].map(str::to_owned)),
+            (false, before) => before.map(|of| {
+                let none = format!("none; the latest before it is {of}");
+                [of_blob.to_owned(), none]
+            }),
+        };
+        if let Some(fact) = fact {
+            facts.insert(1, fact);
         }
         facts.extend(self.facts.iter().cloned());
         let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);

@@ -61,7 +61,7 @@ fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> S
         warnings: Vec::new(),
         report: None,
         as_found: None,
-        certificate: String::new(),
+        certificates: Certificates::default(),
     }
 }
 
@@ -197,17 +197,33 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
     assert!(foot(&full) && !foot(&refused) && !foot(&open));
     assert!(open.contains("<td>number</td><td>document "));
     stage.certificate.texts[2] = "a customer".to_owned();
-    let of = |title, certificate: &str| {
+    let of = |title, [own, before]: [&str; 2]| {
+        let own = Certificates::default()
+            .with(before.to_owned())
+            .with(own.to_owned());
+        let certificates = match title == CERTIFICATE {
+            true => own.next(),
+            false => own,
+        };
         let source = Source {
             title,
-            certificate: certificate.to_owned(),
+            certificates,
             ..source(&stage, &dataset, subject(End::Written, &diagnosis))
         };
         source.html().expect("a page")
     };
-    let judged = of("Verification of a calibration", "B & 6");
-    assert!(!foot(&judged) && judged.contains("<td>B &amp; 6</td>"));
-    assert!(foot(&of(CERTIFICATE, "B & 6")));
-    let again = of(CERTIFICATE, &stage.certificate.texts[0]);
-    assert!(again.contains("a number of its own") && !foot(&again));
+    let judged = of("Verification of a calibration", ["B & 6", "A"]);
+    let named = "<td>certificate of the blob</td><td>";
+    assert!(!foot(&judged) && judged.contains(&format!("{named}B &amp; 6</td>")));
+    let uncertified = of("Verification of a calibration", ["", "A"]);
+    let text = format!("{named}none; the latest before it is A</td>");
+    assert!(uncertified.contains(&text));
+    let next = of(CERTIFICATE, ["B & 6", "A"]);
+    assert!(foot(&next) && next.contains("<td>latest certificate before</td><td>B &amp; 6</td>"));
+    // However early it was taken, and however it is written.
+    let number = stage.certificate.texts[0].clone();
+    for taken in [number.clone(), format!(" {} ", number.to_uppercase())] {
+        let again = of(CERTIFICATE, ["C-2", &taken]);
+        assert!(again.contains("a number of its own") && !foot(&again));
+    }
 }

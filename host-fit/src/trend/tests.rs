@@ -2,6 +2,7 @@ use super::*;
 use crate::report::provenance::Provenance;
 use hallstage_calibration::budget::Budget;
 use hallstage_calibration::judge::predicted::{Predicted, declared_service};
+use hallstage_calibration::recalibrate::Certificates;
 use hallstage_input::shipped;
 use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
@@ -134,7 +135,7 @@ fn known(mut blob: Blob, gain_error: f64) -> Blob {
         budget: Budget::new(&stage, of, &temperature, &predicted, 100),
         up_to: None,
         marks: Vec::new(),
-        certificate: String::new(),
+        certificates: Certificates::default(),
     });
     blob
 }

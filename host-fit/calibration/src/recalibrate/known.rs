@@ -11,8 +11,10 @@ use serde::{Deserialize, Serialize};
 
 /// Marks of a log.
 const MARKS: usize = 256;
-/// Marks that a log and the logs of a fit share only where it is one of them, or a part: 1 s of 30.
+/// Marks that a log and the logs of a fit share only where it is one of them, or a part: most often 1 s of 30, always 2 s.
 const SHARED_MIN: usize = 8;
+/// Numbers of certificates that are kept.
+const NUMBERS_MAX: usize = 1000;
 
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,8 +36,48 @@ pub struct StoredPosterior {
     pub up_to: Option<UpTo>,
     /// Marks of the logs that the blob was fitted to.
     pub marks: Vec<u32>,
-    /// The latest number of a certificate of it or of the calibrations before it; empty without one.
-    pub certificate: String,
+    /// The certificates of it, and of the calibrations before it.
+    pub certificates: Certificates,
+}
+
+/// The numbers of the certificates of a calibration, and of those that it replaces or was recalibrated from.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Certificates {
+    /// Of the calibration; empty without one.
+    pub own: String,
+    /// Of the calibrations before it, the latest last.
+    pub before: Vec<String>,
+}
+
+impl Certificates {
+    /// Those of a calibration that comes after it, and has no certificate yet.
+    #[must_use]
+    pub fn next(mut self) -> Self {
+        if !self.own.is_empty() {
+            self.before.push(std::mem::take(&mut self.own));
+        }
+        let beyond = self.before.len().saturating_sub(NUMBERS_MAX);
+        self.before.drain(..beyond);
+        self
+    }
+
+    /// The same once the calibration has a certificate with this number.
+    #[must_use]
+    pub fn with(self, number: String) -> Self {
+        match self.own == number {
+            true => self,
+            false => Self {
+                own: number,
+                ..self.next()
+            },
+        }
+    }
+
+    /// Whether an earlier calibration has this number, in upper or lower case.
+    pub fn has(&self, number: &str) -> bool {
+        let plain = |number: &str| number.trim().to_lowercase();
+        self.before.iter().any(|of| plain(of) == plain(number))
+    }
 }
 
 impl StoredPosterior {
@@ -54,7 +96,7 @@ impl StoredPosterior {
             budget: None,
             up_to: None,
             marks: Vec::new(),
-            certificate: String::new(),
+            certificates: Certificates::default(),
         })
     }
 
