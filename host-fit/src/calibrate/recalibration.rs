@@ -10,11 +10,12 @@ use crate::report::table::Table;
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::refusal::Refusal;
 use hallstage_calibration::fit::codes_refused;
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
 use hallstage_calibration::recalibrate::{
     RecalibrateError, Recalibration, StoredPosterior, own_logs, recalibrate,
 };
-use hallstage_calibration::words;
+use hallstage_calibration::words::{self, WordedRefusal};
 use hallstage_input::axis::{PLANAR, PROBES};
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
@@ -53,21 +54,29 @@ impl Updated {
         if !own.is_empty() {
             return Err(RecalibrateError::OwnLog(own));
         }
-        let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
+        let mut new = recalibrate(old, known, &log.dataset, stage, change, created)?;
         let warnings = warnings(log, &new);
         let predicted = new.diagnosis.predicted.as_ref();
         let limits = [stage.certificate.limits, [None; 3]];
         let decision = Decision::new(limits, stage, &new.diagnosis, true);
-        let refusal = Refusal::from_findings(&new.diagnosis.findings);
+        let refusal = Refusal::from_findings(&new.diagnosis.findings)
+            .or_else(|| decision.refusal(predicted?.rms));
+        if refusal.is_some() {
+            new.diagnosis.verdict = Some(Verdict::Refused);
+        }
         let mut updated = Self {
             figures: figures(change, &new, log, &warnings),
-            refusal: refusal.or_else(|| decision.refusal(predicted?.rms)),
+            refusal,
             decision,
             new,
             warnings,
         };
         let left = updated.subject().decision();
         updated.figures.set("decision", json!(left));
+        let findings = &updated.new.diagnosis.findings;
+        let refusal = updated.refusal.as_ref();
+        let refusal = refusal.map(|refusal| WordedRefusal(refusal, findings));
+        updated.figures.set("refusal", json!(refusal));
         let found = updated.new.predicted_before.rms;
         let found = decision.figures(found, decision.passes(found));
         updated.figures.set("decision_as_found", json!(found));
