@@ -3,12 +3,14 @@
 //! The same codes are decoded by each blob. For each pose of a grid over the service of `[motion]`, the changes since the first
 //! blob are a line over time, by least squares. The drift of an axis is the slope, rms over the grid. The errors e in service of
 //! the last blob grow with it, to sqrt(e^2 + (drift t)^2) after the time t. Where two levels describe the changes far better than
-//! a line, the axis has jumped, and has no drift.
+//! a line, the axis has jumped, and has no drift. Where the changes are farther from the line than the errors of the calibrations
+//! allow, the line gives no date.
 
 pub mod shown;
 
 use crate::diff::on_grid;
 use crate::report::decision::Decision;
+use hallstage_calibration::budget::Budget;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::paper::Parameters;
@@ -24,6 +26,8 @@ const DAYS_MAX: f64 = 36_525.0;
 const DAY_S: f64 = 86_400.0;
 /// Odds of two levels against a line above which an axis has jumped, for each place where it may have.
 const JUMP_MIN: f64 = 20.0;
+/// Errors of a calibration above which a change is not on the line, rms.
+const OFF_LINE_MIN: f64 = 3.0;
 
 /// A blob with its name, and what is known of it.
 pub type Blob = (String, ParameterSet, Option<StoredPosterior>);
@@ -75,6 +79,8 @@ pub struct Calibration {
     pub moved: [f64; 3],
     /// Errors of X, Y, Rz in service, rms, or on its log where these are not known: m, m, rad.
     pub errors: [f64; 3],
+    /// The same without the noise of the sensors and the declared inputs, which all calibrations have, where these are known.
+    pub own_errors: [f64; 3],
 }
 
 /// How X, Y or Rz changes.
@@ -84,6 +90,10 @@ pub struct Drift {
     pub per_day: f64,
     /// The ends of its 95 % interval; `None` of two calibrations, where a line has no scatter.
     pub interval: Option<[f64; 2]>,
+    /// The changes less the line, rms over service and calibrations: m or rad.
+    pub residual: f64,
+    /// Whether the changes are on the line, within the errors of the calibrations.
+    pub is_line: bool,
     /// The largest rms error in service: m or rad.
     pub limit: Option<f64>,
     /// Days from the last calibration to the limit: by the line, at the earliest and at the latest.
@@ -101,10 +111,17 @@ pub struct Trend {
     pub drifts: [Drift; 3],
     /// The name of the last blob if its errors in service are not known.
     pub unknown: Option<String>,
+    /// The names of blobs that were refused and written all the same.
+    pub forced: Vec<String>,
 }
 
-/// The date of a blob. A time with a zone is an instant, and has the date of UTC.
+/// The date of a blob, as 2026-11-26, with or without a time. A time with a zone is an instant, and has the date of UTC.
 pub fn date(created: &str) -> Option<DateTime> {
+    let dashes = [4, 7].map(|at| created.as_bytes().get(at) == Some(&b'-'));
+    // The parser takes other forms too, and the second 60 as 59.
+    if dashes != [true; 2] || created.starts_with("0000") || created.contains(":60") {
+        return None;
+    }
     let instant = created
         .parse()
         .map(|time: Timestamp| TimeZone::UTC.to_datetime(time));
@@ -165,12 +182,19 @@ impl Trend {
                 (new / old - 1.0, error.map(|error| error / old))
             };
             let budget = known.as_ref().and_then(|known| known.budget.as_ref());
+            let on_log = set.fit.rms.map(f64::from);
+            let own = |of: &Budget| {
+                let (errors, noise, declared) = (of.in_service(), of.noise(), of.declared());
+                let square = |k: usize| errors[k].powi(2) - noise[k].powi(2) - declared[k].powi(2);
+                [0, 1, 2].map(|k| square(k).max(0.0).sqrt())
+            };
             Calibration {
                 date: *date,
                 day: date.duration_since(*start).as_secs_f64() / DAY_S,
                 gains: [0, 1, 2].map(change),
                 moved: [0.0; 3],
-                errors: budget.map_or(set.fit.rms.map(f64::from), |of| of.in_service()),
+                errors: budget.map_or(on_log, Budget::in_service),
+                own_errors: budget.map_or(on_log, own),
             }
         };
         let mut calibrations: Vec<_> = dated.iter().map(calibration).collect();
@@ -189,12 +213,17 @@ impl Trend {
         let errors = calibrations[sets.len() - 1].errors;
         let drift = |axis: usize| {
             let reached = (errors[axis], decision.accepted(axis));
-            drift(&products[axis], &days, reached).ok_or(TrendError::NoLine)
+            let own = calibrations.iter().map(|of| of.own_errors[axis].powi(2));
+            let own = (own.sum::<f64>() / days.len() as f64).sqrt();
+            drift(&products[axis], &days, own, reached).ok_or(TrendError::NoLine)
         };
         Ok(Self {
             drifts: [drift(0)?, drift(1)?, drift(2)?],
             calibrations,
             unknown: budget.is_none().then(|| last.clone()),
+            forced: (dated.iter().filter(|(_, (_, set, _))| set.fit.forced))
+                .map(|(_, (name, ..))| name.clone())
+                .collect(),
         })
     }
 
@@ -224,11 +253,12 @@ fn products(sets: &[&ParameterSet], stage: &Stage) -> Option<[DMatrix<f64>; 3]> 
     Some(products.map(|sum| sum / poses)).filter(|_| poses > 0.0)
 }
 
-/// The drift of an axis by the products of its changes on these days, and when an error in service reaches its limit. `None`
-/// without a line.
+/// The drift of an axis by the products of its changes on these days, with the rms error of a calibration, and when an error in
+/// service reaches its limit. `None` without a line.
 fn drift(
     products: &DMatrix<f64>,
     days: &[f64],
+    own_error: f64,
     (error, limit): (f64, Option<f64>),
 ) -> Option<Drift> {
     let count = days.len();
@@ -260,8 +290,9 @@ fn drift(
     let jump = jump.map(|(first, size, _)| (first, size));
     let freedom = count - 2;
     let variance = scatter / spread / freedom.max(1) as f64;
-    // The scatter adds to the square of a slope.
-    let per_day = (part / spread - variance).max(0.0).sqrt();
+    let per_day = (part / spread).max(0.0).sqrt();
+    let off_line = (scatter / freedom.max(1) as f64).sqrt();
+    let is_line = jump.is_none() && off_line <= OFF_LINE_MIN * own_error;
     let half = student(freedom) * variance.sqrt();
     let ends = [(per_day - half).max(0.0), per_day + half];
     let interval = (freedom > 0).then_some(ends);
@@ -270,12 +301,14 @@ fn drift(
         let room = (limit * limit - error * error).max(0.0).sqrt();
         // Beyond the limit no drift is needed.
         let days = if room > 0.0 { room / per_day } else { 0.0 };
-        Some(days).filter(|days| *days < DAYS_MAX && (jump.is_none() || *days == 0.0))
+        Some(days).filter(|days| *days < DAYS_MAX && (is_line || *days == 0.0))
     };
     let [latest, earliest] = interval.unwrap_or([per_day; 2]);
     Some(Drift {
         per_day,
         interval,
+        residual: (scatter / count as f64).sqrt(),
+        is_line,
         limit,
         days: [per_day, earliest, latest].map(days),
         jump,

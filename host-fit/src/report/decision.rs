@@ -162,7 +162,7 @@ impl Decision {
         let axis = |(k, axis): (usize, &Axis)| {
             let figures = group! {
                 "error" => micro(axis, rms[k]),
-                "limit" => self.accepted(k).map(|limit| micro(axis, limit)),
+                "limit" => micro(axis, self.accepted(k).unwrap_or(f64::NAN)),
                 "pass" => passes[k],
             };
             (axis.key.to_owned(), figures.into())

@@ -46,16 +46,24 @@ fn jump(trend: &Trend, (axis, drift): (usize, &Drift)) -> Option<String> {
 pub fn answer(trend: &Trend) -> String {
     let jumps = trend.drifts.iter().enumerate();
     let jumps: Vec<String> = jumps.filter_map(|drift| jump(trend, drift)).collect();
-    let jumped = match jumps.is_empty() {
+    let off_line = trend.drifts.iter().zip(&PLANAR);
+    let off_line = off_line.filter(|(drift, _)| !drift.is_line && drift.jump.is_none());
+    let off_line = off_line.map(|(drift, axis)| {
+        let (residual, unit) = (drift.residual * 1e6, sign(axis.micro));
+        let name = axis.name;
+        format!("{name} is {residual:.2} {unit} (rms) off its line, beyond the errors of the calibrations")
+    });
+    let said: Vec<String> = jumps.into_iter().chain(off_line).collect();
+    let jumped = match said.is_empty() {
         true => String::new(),
         false => format!(
             "{}: a line does not describe this, and gives no date. ",
-            jumps.join(", ")
+            said.join(", ")
         ),
     };
     let reached = match first_to_end(trend) {
         Some(first) => reached(trend, first),
-        None if !jumps.is_empty() => String::new(),
+        None if !jumped.is_empty() => String::new(),
         None => "No limit will be reached: there is none, or no drift.".to_owned(),
     };
     format!("{jumped}{reached}").trim_end().to_owned()
@@ -90,7 +98,7 @@ fn reached(trend: &Trend, (axis, drift): (usize, &Drift)) -> String {
     }
 }
 
-/// What the user should know: without the posterior of the last blob, errors and limits are other ones.
+/// What the user should know: forced blobs; without the posterior of the last blob, errors and limits are other ones.
 pub fn warnings(trend: &Trend) -> Vec<String> {
     let warning = trend.unknown.iter().map(|name| {
         format!(
@@ -98,7 +106,10 @@ pub fn warnings(trend: &Trend) -> Vec<String> {
              noise is no limit. Copy {name}.posterior there."
         )
     });
-    warning.collect()
+    let forced = trend.forced.iter().map(|name| {
+        format!("{name} was refused and written by --force: its errors are beyond a limit, or its log has a fault")
+    });
+    warning.chain(forced).collect()
 }
 
 /// All figures: a row for each axis, and one for each calibration.
@@ -106,21 +117,25 @@ pub fn figures(trend: &Trend) -> Group {
     let axis = |(k, drift): (usize, &Drift)| {
         let axis = &PLANAR[k];
         let [reached, earliest, latest] = dates(trend, drift);
-        let a_month = |x: f64| micro(axis, x * MONTH);
+        // A figure that is not there has the key of its unit all the same.
+        let or_null = |x: Option<f64>| micro(axis, x.unwrap_or(f64::NAN));
+        let a_month = |x: Option<f64>| or_null(x.map(|x| x * MONTH));
         // A line does not describe a jump.
         let interval = drift.interval.filter(|_| drift.jump.is_none());
         let per_day = drift.jump.is_none().then_some(drift.per_day);
         group! {
             "axis" => axis.name,
-            "error" => trend.calibrations.last().map(|last| micro(axis, last.errors[k])),
-            "limit" => drift.limit.map(|limit| micro(axis, limit)),
-            "drift_a_month" => per_day.map(a_month),
-            "from" => interval.map(|[low, _]| a_month(low)),
-            "to" => interval.map(|[_, high]| a_month(high)),
+            "error" => or_null(trend.calibrations.last().map(|last| last.errors[k])),
+            "limit" => or_null(drift.limit),
+            "drift_a_month" => a_month(per_day),
+            "from" => a_month(interval.map(|[low, _]| low)),
+            "to" => a_month(interval.map(|[_, high]| high)),
+            "off_line" => micro(axis, drift.residual),
+            "is_line" => drift.is_line,
             "reached" => reached,
             "earliest" => interval.and(earliest),
             "latest" => interval.and(latest),
-            "jump" => drift.jump.map(|(_, size)| micro(axis, size)),
+            "jump" => or_null(drift.jump.map(|(_, size)| size)),
             "after" => drift.jump.map(|(first, _)| trend.calibrations[first - 1].date.date().to_string()),
         }
     };
@@ -185,8 +200,8 @@ fn errors(trend: &Trend, days: axis::Axis) -> Chart {
             points.map(|at| (at.day, of(at)[axis] * 1e6)).collect()
         };
         let mut errors = points(|of| of.errors);
-        // A line does not go on from a jump.
-        if drift.jump.is_none() {
+        // A line does not go on from a jump, or where it is none.
+        if drift.is_line {
             errors.extend(forecast(trend, axis, days.1));
         }
         let mut marks = vec![
@@ -215,7 +230,7 @@ pub fn page(
     let last_day = trend.calibrations.last().map_or(0.0, |last| last.day);
     let first = first_to_end(trend).map(|(_, drift)| drift);
     let end = first.and_then(|drift| drift.days[0]);
-    let is_open = first.is_some() || trend.drifts.iter().any(|drift| drift.jump.is_some());
+    let is_open = first.is_some() || trend.drifts.iter().any(|drift| !drift.is_line);
     // As far again as the calibrations reach, or a little beyond the limit.
     let beyond = end.map_or(last_day, |end| (1.1 * end).min(2.0 * last_day));
     let days = axis::Axis(0.0, last_day + beyond);

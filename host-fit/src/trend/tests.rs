@@ -65,7 +65,7 @@ fn an_even_drift_reaches_the_limit_on_its_day() {
     assert!((f64::from((date - last.date.date()).get_days()) - day).abs() <= 1.0);
     // Errors beyond the limit need no drift.
     let days = [0.0, 1.0, 2.0, 3.0];
-    let beyond = super::drift(&DMatrix::zeros(4, 4), &days, (1e-6, Some(0.9e-6)));
+    let beyond = super::drift(&DMatrix::zeros(4, 4), &days, 0.0, (1e-6, Some(0.9e-6)));
     assert_eq!(beyond.map(|of| of.days), Some([Some(0.0); 3]));
     // No limit, no date.
     assert_eq!(found.drifts[1].days, [None; 3]);
@@ -105,7 +105,16 @@ fn a_time_with_a_zone_is_an_instant() {
         Some("2025-12-31")
     );
     assert_eq!(day("2026-01-01T23:00:00").as_deref(), Some("2026-01-01"));
-    assert_eq!(day("today"), None);
+    let other_forms = [
+        "today",
+        "0000-01-01",
+        "20261126",
+        "2026-11-26T23:59:60",
+        "2026-11-26T23:59:60Z",
+    ];
+    for created in other_forms {
+        assert_eq!(day(created), None, "{created}");
+    }
 }
 
 /// A blob with its posterior: a budget from a fit, and errors of the gains, of B twice and of C three times as large.
@@ -212,6 +221,79 @@ fn a_jump_is_named_with_its_dates_and_has_no_line() {
     // Neither scatter alone nor an even drift is a jump.
     assert_eq!(jumped(0.0).drifts[0].jump, None);
     assert_eq!(trend(&[0.0; 6]).drifts[0].jump, None);
+}
+
+#[test]
+fn the_drift_is_the_slope_of_scattered_changes_with_its_interval() {
+    let found = trend(&[0.0, 3e-3, 0.0, 3e-3]);
+    // Of the losses, and 0.2 of the scatter for each month of 30 days.
+    let slope = (2.0 * 3e-3 / 10.0 / DAYS_APART - LOSS_PER_DAY).abs();
+    let expected = slope * 0.5 * shipped::stage().motion.axes[0].service;
+    let drift = &found.drifts[0];
+    assert!((drift.per_day / expected - 1.0).abs() < 0.02, "{drift:?}");
+    let [low, high] = drift.interval.expect("an interval");
+    assert!(low < drift.per_day && drift.per_day < high);
+}
+
+#[test]
+fn changes_beyond_the_errors_are_not_on_a_line_and_have_no_date() {
+    let stage = shipped::stage();
+    // Two jumps.
+    let gains = [0.0, 0.0, 2e-3, 2e-3, 4e-3, 4e-3, 4e-3];
+    let found = |size: f64, error: f64| {
+        let blobs = gains.iter().enumerate().map(|(k, gain)| {
+            let gain = 1.0 - size * gain - LOSS_PER_DAY * DAYS_APART * k as f64;
+            known(blob(DAYS_APART * k as f64, gain, "S"), error)
+        });
+        Trend::new(&blobs.collect::<Vec<_>>(), &stage).expect("a trend")
+    };
+    let jumped = found(1.0, 1e-5);
+    let drift = &jumped.drifts[0];
+    assert_eq!((drift.jump, drift.is_line), (None, false), "{drift:?}");
+    assert_eq!(drift.days, [None; 3]);
+    assert!(drift.per_day > 0.0 && drift.interval.is_some());
+    let said = shown::answer(&jumped);
+    assert!(said.contains("off its line, beyond the errors"), "{said}");
+    let [even, within] = [found(0.0, 1e-5), found(1.0, 1e-2)];
+    assert!(even.drifts[0].is_line && within.drifts[0].is_line);
+}
+
+#[test]
+fn a_forced_blob_is_named() {
+    let mut blobs = [0.0, 30.0].map(|day| blob(day, 1.0, "S"));
+    blobs[0].1.fit.forced = true;
+    let found = Trend::new(&blobs, &shipped::stage()).expect("a trend");
+    let warnings = shown::warnings(&found);
+    assert!(
+        warnings
+            .iter()
+            .any(|of| of.starts_with("day 0 was refused")),
+        "{warnings:?}"
+    );
+    assert!(
+        !warnings
+            .iter()
+            .any(|of| of.starts_with("day 30 was refused"))
+    );
+}
+
+#[test]
+fn a_figure_has_one_key_whatever_its_value() {
+    let keys = |found: &Trend| -> Vec<Vec<String>> {
+        let json = serde_json::to_value(shown::figures(found)).expect("JSON");
+        let axes = json["axes"].as_array().expect("axes").iter();
+        axes.map(|axis| axis.as_object().expect("an axis").keys().cloned().collect())
+            .collect()
+    };
+    let all = [trend(&[0.0; 2]), trend(&[0.0; 6])];
+    let jumped = trend(&[0.0, 0.0, 0.0, 0.0, 2e-3, 2e-3]);
+    assert!(jumped.drifts[0].jump.is_some());
+    let [x, y, rz] = &keys(&jumped)[..] else {
+        panic!("three axes")
+    };
+    assert!(x.iter().any(|key| key == "drift_a_month_um") && x == y);
+    assert!(rz.iter().any(|key| key == "jump_urad"));
+    assert!(all.iter().all(|found| keys(found) == keys(&jumped)));
 }
 
 #[test]
