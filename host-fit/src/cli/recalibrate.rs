@@ -61,6 +61,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     args.json.check_own()?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     kept::check_own_blob(&args.out, &old.serial)?;
+    args.report.check_not_before(&args.params, &old)?;
     if old.model != ModelKind::Field {
         let model = Model::from_kind(old.model).title();
         return Err(RecalibrateError::OtherModel { model }.into());

@@ -14,8 +14,12 @@ use hallstage_calibration::recalibrate::Certificates;
 use hallstage_calibration::words;
 use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
+use runtime::ParameterSet;
 use runtime::parameters::Text;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// Length of a date without a time.
+const DATE_LEN: usize = "2026-11-26".len();
 
 /// Where the report of a command goes.
 #[derive(Debug, Default, Args)]
@@ -85,6 +89,28 @@ impl ReportArgs {
     pub(super) fn facts(&self, serial: &str) -> Vec<[String; 2]> {
         let (operator, created) = (self.operator.as_deref(), self.created.as_deref());
         facts(serial, operator, created, &self.notes)
+    }
+
+    /// Refuses a date before that of a blob that the run has read.
+    pub(super) fn check_not_before(
+        &self,
+        blob: &Path,
+        set: &ParameterSet,
+    ) -> Result<(), HostError> {
+        let created = self.created.as_deref().unwrap_or_default();
+        let [own, before] = [created, &set.created].map(trend::date);
+        let is_before = own.zip(before).is_some_and(|(own, before)| {
+            // A date alone is any time of its day.
+            own < before && (own.date() < before.date() || created.len() > DATE_LEN)
+        });
+        match is_before {
+            true => Err(HostError::input(format!(
+                "--created {created} is before {}, the date of {}",
+                set.created,
+                blob.display()
+            ))),
+            false => Ok(()),
+        }
     }
 
     /// Adds the report to the outputs, if it is asked for.

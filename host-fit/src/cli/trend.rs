@@ -38,6 +38,7 @@ pub(super) fn run(args: &TrendArgs) -> Result<(), HostError> {
     let mut blobs = Vec::new();
     for path in &args.blobs {
         let set = blob_file::read(path)?;
+        args.report.check_not_before(path, &set)?;
         let name = path.display().to_string();
         if let Some(problem) = other_scales(&set, &stage) {
             return Err(HostError::input(format!("{name}: {problem}")));

@@ -213,6 +213,8 @@ fn a_late_probe_is_in_the_errors_of_a_recalibrated_blob_and_one_rule_judges_it_a
     let json = bench.json("new.json");
     let rms = |of: &str| number(&json["predicted_service"][of]["x_um"]);
     assert!(rms("after") > 1.3 * rms("floor"), "{json}");
+    assert_eq!(json["verdict"], "refused");
+    assert!(json["refusal"]["code"].is_string(), "{json}");
     let decision = &json["decision"]["x"];
     assert_eq!(
         (number(&decision["error_um"]), &decision["pass"]),
@@ -279,7 +281,7 @@ fn a_number_is_taken_once_a_certificate_has_it_and_no_other_calibration_takes_it
         says(&page, &format!("<h1>{title}</h1>"));
         page
     };
-    let earlier = "latest certificate before";
+    let earlier = "<td>certificate of the blob</td><td>of the number</td>";
     let verified = |is_taken: bool| {
         let page = title("eval cal.bin new.csv", "Verification of a calibration");
         assert_eq!(page.contains(earlier), is_taken);
@@ -295,6 +297,11 @@ fn a_number_is_taken_once_a_certificate_has_it_and_no_other_calibration_takes_it
         );
         verified(true);
     }
+    bench.bad(
+        "recalibrate cal.bin new.csv --what gains --out new.bin --created 2025-12-31",
+        3,
+        &["2025-12-31", "2026-01-02"],
+    );
     for command in [
         "recalibrate cal.bin new.csv --what gains --out new.bin",
         &format!("fit new.csv {fit}"),
