@@ -142,6 +142,7 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
             OutputProblem::IsInput
             | OutputProblem::IsOutput
             | OutputProblem::NotOwn
+            | OutputProblem::IsCertificate
             | OutputProblem::OtherSerial(_),
         ..
     }) = error.downcast_ref()

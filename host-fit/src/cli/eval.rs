@@ -14,6 +14,7 @@ use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::log::{self, LogError};
 use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -52,15 +53,21 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         .chain(args.logs.inputs());
     super::check_outputs([args.json.path.as_deref()], Some(&args.report), inputs)?;
     args.json.check_own()?;
+    args.report.check_own()?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     let order = EvalOrder {
         zeros: args.delta,
         limit: args.limit,
     };
     // What is known of k and h stands beside the blob.
-    let known = posterior_file::read(&set, &args.params).ok().flatten();
+    let (known, unusable) = match posterior_file::read(&set, &args.params) {
+        Ok(known) => (known, None),
+        Err(cause) => (None, Some(cause.to_string())),
+    };
     let evaluation = evaluate((&set, known.as_ref()), &stage, &args.logs, order)?;
-    let report = evaluation.report(started.elapsed().as_secs_f64());
+    let mut report = evaluation.report(started.elapsed().as_secs_f64());
+    report.warnings.extend(unusable);
+    report.figures.set("warnings", json!(report.warnings));
     let subject = evaluation.subject();
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &report)?;

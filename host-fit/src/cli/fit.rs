@@ -47,6 +47,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         let serial = args.options.serial.as_ref();
         kept::check_own_blob(&args.out, serial.map_or("", |serial| serial.as_str()))?;
         args.json.check_own()?;
+        args.report.check_own()?;
     }
     let created = args.report.created.clone().unwrap_or_default();
     let order = args.options.order(created, interrupt::watch());
@@ -89,7 +90,14 @@ impl FitJob<'_> {
         let kept = self.out.filter(|_| outcome.has_blob);
         let kept = kept.zip(outcome.fitted.as_ref().ok());
         let mut known = outcome.known(&log.dataset);
+        let mut warnings = words::messages(&log.warnings);
         let certificates = kept.map(|(path, fit)| kept::certificates(path, &fit.set));
+        let certificates = certificates.transpose().unwrap_or_else(|cause| {
+            warnings.push(format!(
+                "whether the number of the certificate is taken is not known: {cause}"
+            ));
+            None
+        });
         let mut certificates = certificates.unwrap_or_default();
         page.add(&mut outputs, || {
             let what = (self.title, self.order.settings.serial.as_str());
@@ -103,6 +111,7 @@ impl FitJob<'_> {
                 let blob = blob_file::to_bytes(path, &fit.set)?;
                 let provenance = &mut source.provenance;
                 provenance.add_bytes(path, &blob, "parameter blob, written");
+                source.warnings.clone_from(&warnings);
             }
             source.certificates = certificates.clone();
             if let Some(number) = source.number() {
@@ -132,7 +141,7 @@ impl FitJob<'_> {
         if let (Some(cause), Some(_)) = (&refusal, kept) {
             terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
         }
-        finish(outputs, &details, &words::messages(&log.warnings), &subject)?;
+        finish(outputs, &details, &warnings, &subject)?;
         match (refusal, kept, self.out) {
             (Some(cause), None, None) => Err(HostError::rejected(cause)),
             (Some(cause), None, Some(_)) => {

@@ -5,6 +5,7 @@ use crate::bus::bus_log::BusCounts;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::join::{self, JoinReport, JoinSettings};
+use crate::output::kept;
 use crate::report::figure::{Figure, Group, figure, group};
 use crate::report::text::as_text;
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 pub(super) fn run(args: &JoinSettings) -> Result<(), HostError> {
     let inputs = [&args.a, &args.b, &args.stage.path].map(PathBuf::as_path);
     super::check_outputs([Some(args.out.as_path())], None, inputs)?;
+    kept::check_own(&args.out, kept::LOG)?;
     let report = join::run(args, &args.stage.read()?, interrupt::watch())?;
     terminal::print(&as_text(&figures(&report).tables()))?;
     terminal::show(&report.warnings);

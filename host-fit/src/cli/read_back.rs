@@ -6,7 +6,7 @@ use crate::bus::BusAddress;
 use crate::bus::update::{on, talk_to};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::write_atomically;
+use crate::output::{kept, write_atomically};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -24,6 +24,7 @@ pub(super) struct ReadBackArgs {
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
     super::check_outputs([Some(args.out.as_path())], None, [])?;
+    kept::check_own(&args.out, kept::BLOB)?;
     let (identity, blob) = talk_to(
         &args.can,
         interrupt::watch(),

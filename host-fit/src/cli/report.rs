@@ -3,7 +3,7 @@
 use super::arguments::{Logs, blob_text};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::{Outputs, make_folder};
+use crate::output::{OutputError, Outputs, kept, make_folder};
 use crate::report::page::{Source, facts};
 use crate::report::provenance::Provenance;
 use crate::report::table::Table;
@@ -58,6 +58,12 @@ impl ReportArgs {
     /// The one file of the report.
     pub(super) fn page(&self) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join("index.html"))
+    }
+
+    /// Refuses to replace a page of another program, or a certificate.
+    pub(super) fn check_own(&self) -> Result<(), OutputError> {
+        let page = self.page();
+        page.map_or(Ok(()), |page| kept::check_own_page(&page))
     }
 
     /// What a page says of logs, before there are errors.

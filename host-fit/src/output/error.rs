@@ -32,6 +32,11 @@ pub enum OutputProblem {
         "is there and may hold a measurement; name another file, or move it away (fit, plan, simulate and decode replace it with --force)"
     )]
     NotOwn,
+    /// A page that is a certificate.
+    #[error(
+        "is a calibration certificate; name another folder, or move it away (fit replaces it with --force)"
+    )]
+    IsCertificate,
     /// A blob of another stage.
     #[error(
         "is the blob of stage {0}; name another file, or move it away (fit replaces it with --force)"

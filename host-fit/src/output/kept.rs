@@ -1,7 +1,9 @@
 //! Files that a command does not replace: it did not write them, so they may hold a measurement.
 
+use super::blob_file;
 use super::error::{OutputError, OutputProblem};
-use super::{blob_file, posterior_file};
+use super::posterior_file::{self, PosteriorFileError};
+use crate::report::page::CERTIFICATE;
 use flate2::read::MultiGzDecoder;
 use hallstage_calibration::recalibrate::Certificates;
 use runtime::ParameterSet;
@@ -21,11 +23,17 @@ pub const POSES: &[&[u8]] = &[b"movement,t_us,x_um,y_um,", b"\x93NUMPY"];
 pub const PLAN: &[&[u8]] = &[b"t_us,x_um,y_um,"];
 /// See [`BLOB`].
 pub const TRUTH: &[&[u8]] = &[b"movement,t_us,x_nm,y_nm,"];
-/// A simulated log starts like a measured log.
+/// A simulated or joined log starts like a measured log.
 pub const LOG: &[&[u8]] = &[];
 
+/// How a page of this program starts; its title follows.
+const PAGE: &str = concat!(
+    "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n",
+    "<meta name=\"generator\" content=\"host-fit\">\n<title>"
+);
+
 /// Length of a start.
-const START: u64 = 64;
+const START: u64 = 256;
 
 /// Refuses to replace a file that does not start like this, unless it is empty.
 ///
@@ -36,6 +44,20 @@ pub fn check_own(path: &Path, starts: &[&[u8]]) -> Result<(), OutputError> {
     match start.is_empty() || starts.iter().any(|own| start.starts_with(own)) {
         true => Ok(()),
         false => Err(OutputError::new(path, OutputProblem::NotOwn)),
+    }
+}
+
+/// Refuses to replace a page of another program, or a certificate.
+///
+/// # Errors
+/// [`OutputProblem::NotOwn`], [`OutputProblem::IsCertificate`].
+pub fn check_own_page(path: &Path) -> Result<(), OutputError> {
+    check_own(path, &[PAGE.as_bytes()])?;
+    let start = start_of(path).unwrap_or_default();
+    let title = start.strip_prefix(PAGE.as_bytes());
+    match title.is_some_and(|title| title.starts_with(CERTIFICATE.as_bytes())) {
+        true => Err(OutputError::new(path, OutputProblem::IsCertificate)),
+        false => Ok(()),
     }
 }
 
@@ -54,12 +76,16 @@ pub fn check_own_blob(path: &Path, serial: &str) -> Result<(), OutputError> {
 }
 
 /// The certificates of a blob that takes the place of the one that is there: where it is the same one, it keeps its own.
-pub fn certificates(path: &Path, set: &ParameterSet) -> Certificates {
+///
+/// # Errors
+/// Why the posterior beside that blob does not tell.
+pub fn certificates(path: &Path, set: &ParameterSet) -> Result<Certificates, PosteriorFileError> {
     let there = blob_file::read(path).ok();
     let is_same = there.as_ref() == Some(set);
-    let known = there.and_then(|there| posterior_file::read(&there, path).ok()?);
+    let known = there.map(|there| posterior_file::read(&there, path));
+    let known = known.transpose()?.flatten();
     let there = known.map(|known| known.certificates).unwrap_or_default();
-    if is_same { there } else { there.next() }
+    Ok(if is_same { there } else { there.next() })
 }
 
 /// The first bytes of a file, unpacked; none of devices and pipes.

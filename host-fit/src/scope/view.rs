@@ -74,6 +74,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, history: &History, choice: Choice) {
         .filter(|warning| !warning.is_empty())
         .count();
     let text = match faults {
+        _ if history.counts[0] == 0 => format!("no row yet  {}", history.state),
         0 => format!("no fault of a sensor in this window  {}", history.state),
         faults => format!("faults of sensors: {faults}  {}", history.state),
     };
@@ -225,8 +226,8 @@ mod tests {
             lines.iter().any(|line| line.contains("at 1.0 Hz")),
             "{lines:#?}"
         );
-        // Before the first row.
         screen(&empty(), choice);
-        screen(&empty(), Choice::default());
+        let lines = screen(&empty(), Choice::default());
+        assert!(lines[22].starts_with("no row yet"), "{lines:#?}");
     }
 }

@@ -21,6 +21,8 @@ fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
 fn what_the_command_did_not_write_is_replaced_only_by_force() {
     let bench = Bench::with_log();
     bench.write("old.csv", log());
+    std::fs::create_dir(bench.path("old.r")).expect("a folder");
+    bench.write("old.r/index.html", "<!doctype html>");
     let kept = |command: &str| bench.bad(command, 2, &["old.", "--force"]);
     kept("fit log.csv --out old.csv");
     kept("fit log.csv --out p.bin --json old.csv");
@@ -39,8 +41,14 @@ fn what_the_command_did_not_write_is_replaced_only_by_force() {
         "recalibrate old.bin log.csv --what gain --out new.bin",
     ] {
         kept(&format!("{command} --json old.csv"));
+        if !command.starts_with("inspect") && !command.starts_with("diff") {
+            kept(&format!("{command} --report old.r"));
+        }
     }
+    kept("fit log.csv --out p.bin --report old.r");
+    kept("trend old.bin old.bin --report old.r");
     kept("export old.bin --out old.csv");
+    kept("join log.csv sensors.csv --out old.csv");
     assert_eq!(bench.text("old.csv"), log());
     // Its own files, and by force.
     bench.good("fit log.csv --out old.bin --serial A --model 31");

@@ -166,6 +166,15 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     bench.write("other.bin.posterior", bench.read("old.bin.posterior"));
     let parts = ["other.bin.posterior belongs to another blob"];
     refused("other.bin log.csv --what all", 3, &parts);
+    let judged = bench.run("eval other.bin sine.csv --json e.json");
+    says(stderr(&judged), parts[0]);
+    says(bench.json("e.json")["warnings"].to_string(), parts[0]);
+    let again = "fit log.csv --out other.bin --model field --serial OTHER";
+    let fitted = bench.good(&format!("{again} --created 2026-01-02 --report fitted"));
+    says(
+        stderr(&fitted),
+        "is taken is not known: other.bin.posterior",
+    );
     std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
     let parts = ["old.bin.posterior does not exist", "--what gains"];
     refused("old.bin log.csv --what all", 3, &parts);
@@ -279,6 +288,11 @@ fn a_number_is_taken_once_a_certificate_has_it_and_no_other_calibration_takes_it
         bench.good(&format!("{arguments} --report page"));
         let page = bench.text("page/index.html");
         says(&page, &format!("<h1>{title}</h1>"));
+        if page.contains("<h1>Calibration certificate</h1>") {
+            let eval = "eval cal.bin new.csv --report page";
+            bench.bad(eval, 2, &["page/index.html: is a calibration certificate"]);
+            std::fs::remove_file(bench.path("page/index.html")).expect("there");
+        }
         page
     };
     let earlier = "<td>certificate of the blob</td><td>of the number</td>";
