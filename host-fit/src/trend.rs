@@ -11,6 +11,7 @@ pub mod shown;
 use crate::diff::on_grid;
 use crate::report::decision::Decision;
 use hallstage_calibration::budget::Budget;
+use hallstage_calibration::judge::verdict::Verdict;
 use hallstage_calibration::recalibrate::StoredPosterior;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::paper::Parameters;
@@ -90,7 +91,7 @@ pub struct Drift {
     pub per_day: f64,
     /// The ends of its 95 % interval; `None` of two calibrations, where a line has no scatter.
     pub interval: Option<[f64; 2]>,
-    /// The changes less the line, rms over service and calibrations: m or rad.
+    /// The standard deviation of the calibrations from the line, rms over service: m or rad.
     pub residual: f64,
     /// Whether the changes are on the line, within the errors of the calibrations.
     pub is_line: bool,
@@ -205,10 +206,13 @@ impl Trend {
             of.moved = products.each_ref().map(|products| products[(k, k)].sqrt());
         }
         let table = &stage.certificate;
+        // A forced blob may be beyond the limit of the noise, which then holds as well.
+        let is_forced = sets.last().is_some_and(|set| set.fit.forced);
+        let verdict = is_forced.then_some(Verdict::Refused);
         let budget = last_known.as_ref().and_then(|known| known.budget.as_ref());
         let decision = budget.map_or(Decision::on_log(table.limits), |budget| {
             let by = (&budget.predicted(), Some(budget));
-            Decision::in_service(table.limits, table.is_guarded, by, None)
+            Decision::in_service(table.limits, table.is_guarded, by, verdict)
         });
         let errors = calibrations[sets.len() - 1].errors;
         let drift = |axis: usize| {
@@ -307,7 +311,7 @@ fn drift(
     Some(Drift {
         per_day,
         interval,
-        residual: (scatter / count as f64).sqrt(),
+        residual: off_line,
         is_line,
         limit,
         days: [per_day, earliest, latest].map(days),

@@ -35,6 +35,7 @@ use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::{RANGE_MARGIN, calibration};
 use crate::judge::in_motion::by_lags;
 use crate::judge::predicted::{Predicted, Validity, declared_service};
+use crate::judge::verdict::{GOOD_MAX, Verdict};
 use crate::judge::{Decoded, Judgement, Zeros};
 use hallstage_input::channel::Channel;
 use hallstage_input::channels::columns;
@@ -228,6 +229,10 @@ pub fn recalibrate(
     let late = by_lags(lags_s(&diagnosis.findings), &update.parameters, stage);
     let late = late.unwrap_or_default();
     diagnosis.predicted = diagnosis.predicted.map(|of| of.with_added(late));
+    let is_limited = (diagnosis.predicted).is_some_and(|of| of.worst_ratio() > GOOD_MAX);
+    if is_limited && diagnosis.verdict == Some(Verdict::Good) {
+        diagnosis.verdict = Some(Verdict::Limited);
+    }
     // With what the sensors add in service.
     let budget = (diagnosis.predicted.as_ref())
         .filter(|_| known.is_some())

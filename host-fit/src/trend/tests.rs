@@ -259,6 +259,18 @@ fn changes_beyond_the_errors_are_not_on_a_line_and_have_no_date() {
 }
 
 #[test]
+fn a_forced_blob_beyond_the_limit_of_the_noise_has_reached_it() {
+    let mut blobs = [0.0, 30.0].map(|day| known(blob(day, 1.0, "S"), 0.05));
+    let days = |blobs: &[Blob]| {
+        let found = Trend::new(blobs, &shipped::stage()).expect("a trend");
+        found.drifts[0].days
+    };
+    assert_eq!(days(&blobs), [None; 3]);
+    blobs[1].1.fit.forced = true;
+    assert_eq!(days(&blobs), [Some(0.0); 3]);
+}
+
+#[test]
 fn a_forced_blob_is_named() {
     let mut blobs = [0.0, 30.0].map(|day| blob(day, 1.0, "S"));
     blobs[0].1.fit.forced = true;

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// Marks of a log.
 const MARKS: usize = 256;
-/// Marks that a log and the logs of a fit share only where it is one of them, or a part: most often 1 s of 30, always 2 s.
+/// Marks that a log and the logs of a fit share only where it is one of them, or a part: 1 s of 30 in half of
+/// the cases, 2 s always.
 const SHARED_MIN: usize = 8;
 /// Numbers of certificates that are kept.
 const NUMBERS_MAX: usize = 1000;

@@ -173,10 +173,10 @@ impl<'a> RowReader<'a> {
                     cell: source.cell,
                     fault: CellFault::Temperature {
                         celsius: temperature_mc * 1e-3,
-                        unit: if temperature_mc < KELVIN_MAX_MC {
-                            "K"
-                        } else {
-                            "mC"
+                        unit: match temperature_mc < KELVIN_MAX_MC {
+                            true if self.zero_mc < 0.0 => "C",
+                            true => "K",
+                            false => "mC",
                         },
                     },
                 }),
