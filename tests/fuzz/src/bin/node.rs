@@ -55,7 +55,7 @@ fuzz_target!(|data: &[u8]| {
     let (mut now_us, mut asked_to_record) = (0u32, false);
     let mut flash = FlashModel::erased();
     flash.load(0, PARAMS);
-    let key = (form & 2 == 2).then_some([7; 16]);
+    let key = (form & 2 == 2).then_some(&[7; 16]);
     let mut controller = Node::new(Some("HS-0007"), key, flash, form.into());
     let mut records = 0;
     let mut step = |step: Step| match step {
