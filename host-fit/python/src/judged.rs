@@ -15,7 +15,7 @@ use host_fit::calibration::diagnose::refusal::Refusal;
 use host_fit::calibration::judge::Judgement;
 use host_fit::calibration::recalibrate::Certificates;
 use host_fit::calibration::words;
-use host_fit::report::page::CERTIFICATE;
+use host_fit::output::kept::CERTIFICATE;
 use host_fit::solver::estimator::update::Change;
 use numpy::PyArray2;
 use pyo3::prelude::*;

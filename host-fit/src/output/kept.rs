@@ -3,7 +3,6 @@
 use super::blob_file;
 use super::error::{OutputError, OutputProblem};
 use super::posterior_file::{self, PosteriorFileError};
-use crate::report::page::CERTIFICATE;
 use flate2::read::MultiGzDecoder;
 use hallstage_calibration::recalibrate::Certificates;
 use runtime::ParameterSet;
@@ -31,6 +30,9 @@ const PAGE: &str = concat!(
     "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n",
     "<meta name=\"generator\" content=\"host-fit\">\n<title>"
 );
+
+/// The title of a page that may be a certificate.
+pub const CERTIFICATE: &str = "Calibration certificate";
 
 /// Length of a start.
 const START: u64 = 256;

@@ -12,6 +12,7 @@ use super::result::Report;
 use super::table::Table;
 use super::text::file_name;
 use super::verdict::{End, Subject, Summary};
+use crate::output::kept::CERTIFICATE;
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::{PoseError, white_noise};
 use hallstage_calibration::judge::verdict::Verdict;
@@ -24,8 +25,6 @@ use hallstage_solver::estimator::model::Model;
 use minijinja::Error;
 use runtime::ModelKind;
 
-/// The title of a page that may be a certificate.
-pub const CERTIFICATE: &str = "Calibration certificate";
 /// The same until the fields of a certificate are filled in.
 const REPORT: &str = "Calibration report";
 const NO_DATE: &str = "not given; name it with --created";
