@@ -19,9 +19,9 @@ mod sensors;
 
 pub use error::JoinError;
 
+use crate::arguments::{StageFile, between, choice};
 use crate::bus::BusAddress;
 use crate::bus::bus_log::BusCounts;
-use crate::cli::arguments::{StageFile, between, choice};
 use crate::output::Output;
 use clap::Args;
 use hallstage_input::finding::Finding;

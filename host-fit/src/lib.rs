@@ -10,6 +10,7 @@
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
+//! | [`arguments`] | numbers, choices and the stage file, as commands take them |
 //! | [`diff`] | what changed between two blobs |
 //! | [`scope`] | sensors as traces in a terminal |
 //! | [`trend`] | how the calibrations of a stage change |
@@ -23,6 +24,7 @@ pub use {
     hallstage_solver as solver,
 };
 
+pub mod arguments;
 pub mod bus;
 pub mod calibrate;
 pub mod cli;

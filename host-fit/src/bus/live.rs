@@ -12,8 +12,8 @@ pub use bus::BusError;
 pub(crate) use bus::{Bus, now_us};
 pub(crate) use run::run;
 
+use crate::arguments::{hold, seconds};
 use crate::bus::BusAddress;
-use crate::cli::arguments::{hold, seconds};
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use clap::Args;

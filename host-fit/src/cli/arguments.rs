@@ -1,33 +1,16 @@
-//! What several commands take: logs and their stage, numbers, the library's own choices by name.
+//! What several commands take: logs and their stage, figures, threads.
 
 use super::interrupt;
-use crate::calibrate::Choice;
+pub(super) use crate::arguments::{StageFile, between, choice, hold, seconds};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{OutputError, Outputs, kept};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hallstage_input::log::{self, BadRows, LogReading, ReadOptions};
 use hallstage_input::source::SourceProblem;
 use hallstage_input::stage::{Stage, StageError};
-use runtime::OnInvalid;
 use runtime::parameters::Text;
-use std::num::ParseIntError;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-
-/// The stage file of a command.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct StageFile {
-    /// The stage as designed.
-    #[arg(
-        id = "stage",
-        long = "stage",
-        value_name = "FILE",
-        default_value = "stage.toml"
-    )]
-    pub(crate) path: PathBuf,
-}
 
 impl StageFile {
     pub(super) fn read(&self) -> Result<Stage, HostError> {
@@ -128,39 +111,6 @@ pub(super) struct Threads {
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) number: Option<u16>,
-}
-
-/// Parses a [`Choice`].
-pub(crate) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
-    let value = |(_, name, help): (T, &'static str, &'static str)| match help {
-        "" => PossibleValue::new(name),
-        help => PossibleValue::new(name).help(help),
-    };
-    PossibleValuesParser::new(T::all().into_iter().map(value)).try_map(|name| {
-        let found = T::all().into_iter().find(|(_, known, _)| *known == name);
-        found.map(|(value, ..)| value).ok_or("not a known value")
-    })
-}
-
-/// A number between two ends, both included.
-pub(crate) fn between(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (low..=high).contains(&number) => Ok(number),
-        _ => Err(format!("expected {what} from {low} to {high}")),
-    }
-}
-
-/// How long a bus is watched.
-pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
-    between(text, 1e-9, 1e9, "a number of seconds").map(Duration::from_secs_f64)
-}
-
-/// What an invalid field reads: `--hold N`.
-pub(crate) fn hold(text: &str) -> Result<OnInvalid, ParseIntError> {
-    Ok(match text.parse()? {
-        0 => OnInvalid::Zero,
-        ticks => OnInvalid::Hold { ticks },
-    })
 }
 
 /// How many rows are fitted: a number, or `None` for `all`.
