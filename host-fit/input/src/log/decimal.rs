@@ -69,8 +69,10 @@ impl NumberForm {
         let digits = whole.trim_start_matches(['-', '+']);
         let mut parts = digits.split(is_group);
         let first = parts.next()?;
+        // `0,234` is no number with groups: a factor of a thousand is not guessed.
+        let leads = first.len() <= 3 && first.starts_with(|c| matches!(c, '1'..='9'));
         let is_sound = parts.clone().all(|part| part.len() == 3)
-            && (first.len() <= 3 || parts.next().is_none())
+            && (leads || parts.next().is_none())
             && digits.chars().all(|c| c.is_ascii_digit() || is_group(c));
         let plain = whole.replace(is_group, "") + &rest.replace(decimal, ".");
         fast_float2::parse(plain).ok().filter(|_| is_sound)
@@ -167,6 +169,14 @@ mod tests {
             ("1,234.5", form(false, true), Some(1234.5)),
             ("-1.234,5", form(true, true), Some(-1234.5)),
             ("1,234", form(false, true), Some(1234.0)),
+            ("0.5", form(true, true), None),
+            ("\u{2212}0,5", form(true, true), Some(-0.5)),
+            ("0,234", form(false, true), None),
+            (",234", form(false, true), None),
+            ("-,234.5", form(false, true), None),
+            (".234", form(true, true), None),
+            ("012,345", form(false, true), None),
+            ("0 234", form(false, false), None),
             ("1,234", form(false, false), None),
             ("1.234", form(true, false), None),
             ("1.5", form(true, true), None),
