@@ -30,14 +30,15 @@ impl Dataset {
         for source in self.logs.iter().filter(|log| log.has_reference) {
             let run =
                 |run: Range<usize>| source.rows.start + run.start..source.rows.start + run.end;
-            for rows in runs(self, source).into_iter().map(run) {
+            let own = runs(self, source).into_iter().map(run).flat_map(|rows| {
                 let found = in_run(&self.rows[rows.clone()], interferometer);
-                resets.extend(found.into_iter().map(|row| rows.start + row));
+                found.into_iter().map(move |row| rows.start + row)
+            });
+            let own: Vec<usize> = own.collect();
+            // Values that are held jump again and again.
+            if own.len() * RARITY <= source.rows.len() {
+                resets.extend(own);
             }
-        }
-        // Values that are held jump again and again.
-        if resets.len() * RARITY > self.rows.len() {
-            return Vec::new();
         }
         for &row in resets.iter().rev() {
             let number = self.rows[row].movement;
@@ -94,7 +95,7 @@ fn jumps(window: &[Row], weights: [f64; 3], of: impl Fn(&Row) -> [f64; 3]) -> [f
 
 #[cfg(test)]
 mod tests {
-    use crate::dataset::Dataset;
+    use crate::dataset::{Dataset, Movement, Row};
     use crate::log::{self, ReadOptions};
     use crate::shipped::{RUN_GZ, stage};
 
@@ -134,7 +135,26 @@ mod tests {
             let first = rows[0].reference;
             rows.iter_mut().for_each(|row| row.reference = first);
         }
-        assert!(held.split_at_resets(&stage().interferometer).is_empty());
+        let mut sound = run();
+        let rows = sound.rows.len();
+        add(&mut sound, 4321, rows, [5.0, -3.0, 10.0]);
+        // It is so for each log by itself.
+        let (mut both, movements) = (held.clone(), held.movements.len());
+        let later = |row: Row| Row {
+            movement: row.movement + movements,
+            ..row
+        };
+        both.rows.extend(sound.rows.into_iter().map(later));
+        both.movements
+            .extend(sound.movements.into_iter().map(|of| Movement {
+                log: 1,
+                rows: rows + of.rows.start..rows + of.rows.end,
+                ..of
+            }));
+        both.end_log("sound");
+        let interferometer = &stage().interferometer;
+        assert!(held.split_at_resets(interferometer).is_empty());
+        assert_eq!(both.split_at_resets(interferometer), [rows + 4321]);
     }
 
     #[test]
