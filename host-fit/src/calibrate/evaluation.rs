@@ -7,7 +7,7 @@ use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::range::faster;
 use hallstage_calibration::diagnose::refusal::{Beyond, Refusal, are_elsewhere};
 use hallstage_calibration::diagnose::{BlobUse, Diagnosis, diagnose_blob, diagnose_log};
-use hallstage_calibration::fit::{Fit, FitError, FitSettings, ModelChoice, counted, fit};
+use hallstage_calibration::fit::{FitSettings, ModelChoice, counted, fit};
 use hallstage_calibration::judge::predicted::Validity;
 use hallstage_calibration::judge::statistics::PoseError;
 use hallstage_calibration::judge::verdict::Verdict;
@@ -118,7 +118,19 @@ impl Evaluation {
             Some(Refusal::OtherLog { apart, .. }) => {
                 let own = fit(&log.dataset, stage, &FitSettings::new(ModelChoice::Auto));
                 *apart = own.as_ref().ok().map(|own| apart_from(set, &own.set));
-                let mut faults = faults_of(&log.dataset, stage, own.as_ref());
+                let of_fit = diagnose_log(&log.dataset, stage, own.as_ref());
+                // A blob that describes the log without some rows: these rows have the faults, also small ones.
+                let describes_rest = own.as_ref().is_ok_and(|own| {
+                    let outliers: Vec<usize> = own.fitted.outliers().collect();
+                    let rest = own.rows(&log.dataset).without(&outliers);
+                    let errors = Decoded::new(set, &rest).judge(&rest, stage, own_zeros);
+                    other_log(set, &errors.errors, limit).is_none()
+                });
+                let least = match describes_rest {
+                    true => Severity::Warn,
+                    false => Severity::Refuse,
+                };
+                let mut faults = faults_of(of_fit, least);
                 // It is about the fit to the log.
                 let predicted = faults.predicted.take();
                 if !apart.is_some_and(are_elsewhere) {
@@ -247,24 +259,19 @@ fn apart_from(a: &ParameterSet, b: &ParameterSet) -> [f64; 2] {
     ]
 }
 
-/// What is wrong with a log, by a fit to the log itself: the residuals of a blob that does not describe it say nothing of
-/// its channels.
-fn faults_of(dataset: &Dataset, stage: &Stage, own: Result<&Fit, &FitError>) -> Diagnosis {
-    let Diagnosis {
-        mut findings,
-        columns,
-        predicted,
-        ..
-    } = diagnose_log(dataset, stage, own);
-    let is_fault = |found: &Finding| found.severity == Severity::Refuse || found.is_repaired;
+/// What is wrong with a log, of the diagnosis of a fit to the log itself: the residuals of a blob that does not describe it
+/// say nothing of its channels. Faults that the fit repairs count, and those from a severity on.
+fn faults_of(of_fit: Diagnosis, least: Severity) -> Diagnosis {
+    let mut findings = of_fit.findings;
+    let is_fault = |found: &Finding| found.severity >= least || found.is_repaired;
     findings.retain(|found| is_fault(found) && found.code().entry().explains_from.is_some());
     findings
         .iter_mut()
         .for_each(|found| found.is_repaired = false);
     Diagnosis {
         findings,
-        columns,
-        predicted,
+        columns: of_fit.columns,
+        predicted: of_fit.predicted,
         ..Diagnosis::default()
     }
 }

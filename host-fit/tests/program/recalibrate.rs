@@ -265,6 +265,13 @@ fn eval_tells_an_aged_blob_from_one_of_another_stage_and_from_the_log_of_the_fit
     bench.good("simulate --plan run.csv --seed 4 --out other.csv");
     let words = "A fit to this log has the probes elsewhere";
     assert_eq!(judged("other.csv", words, "other_log"), Some(0));
+    // A row is blamed where the blob describes the rest.
+    let spike = changed(&bench.text("log.csv"), |row, cells| {
+        cells[HALL_A] += 3000 * i64::from(row == 2000)
+    });
+    bench.write("spike.csv", spike);
+    let words = "If it is, the log has the faults above.";
+    assert_eq!(judged("spike.csv", words, "other_log"), Some(1));
 }
 
 #[test]
