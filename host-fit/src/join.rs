@@ -190,8 +190,16 @@ pub(crate) fn run(
 }
 
 #[cfg(test)]
-#[path = "join/tests.rs"]
-mod tests;
+#[path = "join/records_for_tests.rs"]
+mod records_for_tests;
+
+#[cfg(test)]
+#[path = "join/offset_tests.rs"]
+mod offset_tests;
+
+#[cfg(test)]
+#[path = "join/fault_tests.rs"]
+mod fault_tests;
 
 #[cfg(test)]
 #[path = "join/table_tests.rs"]

@@ -1,6 +1,6 @@
 //! Clocks that differ, over two minutes.
 
-use super::tests::{M_PER_CODE, files, hall, record, reference_of, run, signals_m};
+use super::records_for_tests::{M_PER_CODE, files, hall, record, reference_of, run, signals_m};
 use super::*;
 
 const TICKS: u32 = 57_000;

@@ -1,7 +1,7 @@
 //! Inputs that are damaged, mixed up or not what they should be. The fuzz targets `candump` and `reference`
 //! try what no one thinks of.
 
-use super::tests::{candump, files, reference};
+use super::records_for_tests::{candump, files, reference};
 use super::*;
 
 #[test]

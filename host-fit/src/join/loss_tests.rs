@@ -1,6 +1,6 @@
 //! Frames that the recorder lost or received late: each row still holds the data of its own tick.
 
-use super::tests::{Import, files, hall, record, reference};
+use super::records_for_tests::{Import, files, hall, record, reference};
 use super::*;
 use hal_adapters::can::Coded;
 use std::f64::consts::TAU;

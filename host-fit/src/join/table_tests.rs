@@ -1,6 +1,6 @@
 //! Two tables, each with its own clock.
 
-use super::tests::{Import, files, hall, pose, reference, reference_of};
+use super::records_for_tests::{Import, files, hall, pose, reference, reference_of};
 use super::*;
 use hallstage_input::finding::Kind;
 use std::fmt::Write;
