@@ -22,7 +22,7 @@ pub use error::JoinError;
 use crate::arguments::{StageFile, between, choice};
 use crate::bus::BusAddress;
 use crate::bus::bus_log::BusCounts;
-use crate::output::Output;
+use crate::output::{Output, packed};
 use clap::Args;
 use hallstage_input::finding::Finding;
 use hallstage_input::log::BadRows;
@@ -51,7 +51,7 @@ pub(crate) struct JoinSettings {
     pub(crate) b: PathBuf,
     #[command(flatten)]
     pub(crate) stage: StageFile,
-    /// Where to write the calibration log.
+    /// Where to write the calibration log: CSV, or CSV.gz if the name ends so.
     #[arg(long, value_name = "LOG.csv")]
     pub(crate) out: PathBuf,
     /// Largest time from the sample of the reference before a row of the sensors to the sample after it, us; one and a
@@ -169,14 +169,13 @@ pub(crate) fn run(
         &mut |row| {
             format.append(&mut text, (row.movement, row.t_us), row.values, &row.frame);
             if text.len() > TEXT_BYTES {
-                log.write(text.as_bytes())?;
-                text.clear();
+                log.write(&packed(&settings.out, std::mem::take(&mut text))?)?;
             }
             Ok(())
         },
     )?;
     join.check()?;
-    log.write(text.as_bytes())?;
+    log.write(&packed(&settings.out, text)?)?;
     log.finish()?;
     Ok(JoinReport {
         bus: sensors.bus,

@@ -3,9 +3,8 @@
 use super::arguments::{StageFile, between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::{Outputs, kept};
+use crate::output::{Outputs, kept, packed};
 use clap::Args;
-use flate2::{Compression, write::GzEncoder};
 use hallstage_input::axis::counted;
 use hallstage_simulate::assembly::Magnets;
 use hallstage_simulate::dynamics::MotionEffects;
@@ -13,8 +12,7 @@ use hallstage_simulate::log_text::{log_csv, truth_csv};
 use hallstage_simulate::plan_file;
 use hallstage_simulate::protocol::{Protocol, Run};
 use hallstage_simulate::recording::record_stage;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -108,9 +106,9 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     let recording = record_stage(&stage, run, args.hour, dynamics, args.seed)?;
     let mut outputs = Outputs::default();
     if let Some(path) = truth {
-        outputs.add(path, &bytes(path, truth_csv(&recording))?)?;
+        outputs.add(path, &packed(path, truth_csv(&recording))?)?;
     }
-    outputs.add(&args.out, &bytes(&args.out, log_csv(&recording, &stage))?)?;
+    outputs.add(&args.out, &packed(&args.out, log_csv(&recording, &stage))?)?;
     outputs.commit()?;
     let magnets = match Magnets::from_seed(args.seed) {
         Magnets::AsDesigned => "magnets as designed",
@@ -123,14 +121,4 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         counted(recording.movements.len(), "movement"),
         args.seed
     ))
-}
-
-/// A CSV, compressed if the name ends in `.gz`.
-fn bytes(path: &Path, csv: String) -> Result<Vec<u8>, HostError> {
-    if path.extension().is_none_or(|extension| extension != "gz") {
-        return Ok(csv.into_bytes());
-    }
-    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    let packed = gzip.write_all(csv.as_bytes()).and_then(|()| gzip.finish());
-    Ok(packed?)
 }

@@ -57,6 +57,11 @@ fn tables_are_joined_in_any_order_whatever_their_rates_ends_and_gaps() {
     join.check_poses(1e-9);
     let swapped = join.with(|settings| std::mem::swap(&mut settings.a, &mut settings.b));
     assert_eq!(swapped.run(), report);
+    let rows = swapped.log().rows;
+    let gz = swapped.with(|settings| assert!(settings.out.set_extension("csv.gz")));
+    assert_eq!(gz.run(), report);
+    let bytes = std::fs::read(&gz.settings.out).expect("written");
+    assert_eq!((&bytes[..2], gz.log().rows), (&[0x1f, 0x8b][..], rows));
 }
 
 #[test]

@@ -30,9 +30,24 @@ pub mod record_file;
 pub use error::{OutputError, OutputProblem};
 pub use file::{Output, check_writable, is_standard, is_standard_output, keep_apart};
 
+use flate2::{Compression, write::GzEncoder};
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// A text for `path`, whole or in part: compressed if the name ends in `.gz`.
+///
+/// # Errors
+/// [`OutputError`].
+pub fn packed(path: &Path, text: String) -> Result<Vec<u8>, OutputError> {
+    if path.extension().is_none_or(|extension| extension != "gz") {
+        return Ok(text.into_bytes());
+    }
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    let packed = gzip.write_all(text.as_bytes());
+    let packed = packed.and_then(|()| gzip.finish());
+    packed.map_err(|source| OutputError::from_system(path, source))
+}
 
 /// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and keeps its permissions. A link is
 /// followed. A device, a pipe and standard output (`-`) are written to directly.
