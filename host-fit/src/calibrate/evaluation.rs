@@ -15,7 +15,6 @@ use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
 use hallstage_calibration::recalibrate::{Certificates, StoredPosterior, own_logs};
 use hallstage_calibration::words;
 use hallstage_input::axis::{Axis, PLANAR};
-use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
 use hallstage_input::stage::Stage;
