@@ -129,6 +129,17 @@ pub fn date(created: &str) -> Option<DateTime> {
     instant.or_else(|_| created.parse()).ok()
 }
 
+/// Whether a date is before another one: of two times with a zone the instants count, else the days as they are written.
+pub fn is_before(created: &str, other: &str) -> bool {
+    let instant = |text: &str| text.parse::<Timestamp>().ok();
+    let dated = [created, other].map(|text| date(text).and(text.get(..10)));
+    match (instant(created).zip(instant(other)), dated) {
+        (Some((own, other)), _) => own < other,
+        (None, [Some(own), Some(other)]) => own < other,
+        _ => false,
+    }
+}
+
 impl Trend {
     /// The trend of blobs. Their errors have the limits of a calibration that is left as the last blob is.
     ///

@@ -18,9 +18,6 @@ use runtime::ParameterSet;
 use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 
-/// Length of a date without a time.
-const DATE_LEN: usize = "2026-11-26".len();
-
 /// Where the report of a command goes.
 #[derive(Debug, Default, Args)]
 pub(super) struct ReportArgs {
@@ -104,12 +101,7 @@ impl ReportArgs {
         set: &ParameterSet,
     ) -> Result<(), HostError> {
         let created = self.created.as_deref().unwrap_or_default();
-        let [own, before] = [created, &set.created].map(trend::date);
-        let is_before = own.zip(before).is_some_and(|(own, before)| {
-            // A date alone is any time of its day.
-            own < before && (own.date() < before.date() || created.len() > DATE_LEN)
-        });
-        match is_before {
+        match trend::is_before(created, &set.created) {
             true => Err(HostError::input(format!(
                 "--created {created} is before {}, the date of {}",
                 set.created,

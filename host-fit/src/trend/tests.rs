@@ -122,6 +122,18 @@ fn known(mut blob: Blob, gain_error: f64) -> Blob {
     let stage = shipped::stage();
     let parameters = FieldParameters::from_set(&blob.1, &stage).expect("of the field model");
     let noise = Noise {
+#[test]
+fn a_time_with_a_zone_and_a_date_without_one_are_compared_by_their_days() {
+    let before = |own, other| assert!(is_before(own, other) && !is_before(other, own));
+    let even = |own, other| assert!(!is_before(own, other) && !is_before(other, own));
+    even("2026-11-26T08:00:00+09:00", "2026-11-26");
+    even("2026-11-26T08:00:00+09:00", "2026-11-26T23:00:00");
+    even("2026-11-26T08:00:00+09:00", "2026-11-25T23:00:00Z");
+    before("2026-11-26T08:00:00+09:00", "2026-11-25T23:30:00Z");
+    before("2026-11-25T23:00:00-09:00", "2026-11-26");
+    even("yesterday", "2026-11-26");
+}
+
         white_m: [0.5e-6; 3],
         drift: [0.0; 3],
     };
