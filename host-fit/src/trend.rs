@@ -80,8 +80,8 @@ pub struct Calibration {
     pub moved: [f64; 3],
     /// Errors of X, Y, Rz in service, rms, or on its log where these are not known: m, m, rad.
     pub errors: [f64; 3],
-    /// The same without the noise of the sensors and the declared inputs, which all calibrations have, where these are known.
-    pub own_errors: [f64; 3],
+    /// Its errors in service without the noise of the sensors and the declared inputs, which all calibrations have, if known.
+    pub own_errors: Option<[f64; 3]>,
 }
 
 /// How X, Y or Rz changes.
@@ -93,8 +93,8 @@ pub struct Drift {
     pub interval: Option<[f64; 2]>,
     /// The standard deviation of the calibrations from the line, rms over service: m or rad.
     pub residual: f64,
-    /// Whether the changes are on the line, within the errors of the calibrations.
-    pub is_line: bool,
+    /// Whether the changes are on the line, within the errors of the calibrations; `None` where these are not all known.
+    pub is_line: Option<bool>,
     /// The largest rms error in service: m or rad.
     pub limit: Option<f64>,
     /// Days from the last calibration to the limit: by the line, at the earliest and at the latest.
@@ -206,7 +206,7 @@ impl Trend {
                 gains: [0, 1, 2].map(change),
                 moved: [0.0; 3],
                 errors: budget.map_or(on_log, Budget::in_service),
-                own_errors: budget.map_or(on_log, own),
+                own_errors: budget.map(own),
             }
         };
         let mut calibrations: Vec<_> = dated.iter().map(calibration).collect();
@@ -228,8 +228,11 @@ impl Trend {
         let errors = calibrations[sets.len() - 1].errors;
         let drift = |axis: usize| {
             let reached = (errors[axis], decision.accepted(axis));
-            let own = calibrations.iter().map(|of| of.own_errors[axis].powi(2));
-            let own = (own.sum::<f64>() / days.len() as f64).sqrt();
+            let squares = calibrations
+                .iter()
+                .map(|of| Some(of.own_errors?[axis].powi(2)));
+            let square: Option<f64> = squares.sum();
+            let own = square.map(|square| (square / days.len() as f64).sqrt());
             drift(&products[axis], &days, own, reached).ok_or(TrendError::NoLine)
         };
         Ok(Self {
@@ -268,12 +271,12 @@ fn products(sets: &[&ParameterSet], stage: &Stage) -> Option<[DMatrix<f64>; 3]> 
     Some(products.map(|sum| sum / poses)).filter(|_| poses > 0.0)
 }
 
-/// The drift of an axis by the products of its changes on these days, with the rms error of a calibration, and when an error in
-/// service reaches its limit. `None` without a line.
+/// The drift of an axis by the products of its changes on these days, with the rms error of a calibration, if known, and when an
+/// error in service reaches its limit. `None` without a line.
 fn drift(
     products: &DMatrix<f64>,
     days: &[f64],
-    own_error: f64,
+    own_error: Option<f64>,
     (error, limit): (f64, Option<f64>),
 ) -> Option<Drift> {
     let count = days.len();
@@ -307,7 +310,10 @@ fn drift(
     let variance = scatter / spread / freedom.max(1) as f64;
     let per_day = (part / spread).max(0.0).sqrt();
     let off_line = (scatter / freedom.max(1) as f64).sqrt();
-    let is_line = jump.is_none() && off_line <= OFF_LINE_MIN * own_error;
+    let is_line = match (jump, own_error) {
+        (Some(_), _) => Some(false),
+        (None, own) => own.map(|own| off_line <= OFF_LINE_MIN * own),
+    };
     let half = student(freedom) * variance.sqrt();
     let ends = [(per_day - half).max(0.0), per_day + half];
     let interval = (freedom > 0).then_some(ends);
@@ -316,7 +322,7 @@ fn drift(
         let room = (limit * limit - error * error).max(0.0).sqrt();
         // Beyond the limit no drift is needed.
         let days = if room > 0.0 { room / per_day } else { 0.0 };
-        Some(days).filter(|days| *days < DAYS_MAX && (is_line || *days == 0.0))
+        Some(days).filter(|days| *days < DAYS_MAX && (is_line != Some(false) || *days == 0.0))
     };
     let [latest, earliest] = interval.unwrap_or([per_day; 2]);
     Some(Drift {

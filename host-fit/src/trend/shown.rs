@@ -47,7 +47,8 @@ pub fn answer(trend: &Trend) -> String {
     let jumps = trend.drifts.iter().enumerate();
     let jumps: Vec<String> = jumps.filter_map(|drift| jump(trend, drift)).collect();
     let off_line = trend.drifts.iter().zip(&PLANAR);
-    let off_line = off_line.filter(|(drift, _)| !drift.is_line && drift.jump.is_none());
+    let off_line =
+        off_line.filter(|(drift, _)| drift.is_line == Some(false) && drift.jump.is_none());
     let off_line = off_line.map(|(drift, axis)| {
         let (residual, unit) = (drift.residual * 1e6, sign(axis.micro));
         let name = axis.name;
@@ -109,7 +110,12 @@ pub fn warnings(trend: &Trend) -> Vec<String> {
     let forced = trend.forced.iter().map(|name| {
         format!("{name} was refused and written by --force: its errors are beyond a limit, or its log has a fault")
     });
-    warning.chain(forced).collect()
+    let not_judged = trend.drifts.iter().any(|drift| drift.is_line.is_none());
+    let not_judged = not_judged.then(|| {
+        "whether the changes are on a line is not known: a blob has no posterior beside it"
+            .to_owned()
+    });
+    warning.chain(not_judged).chain(forced).collect()
 }
 
 /// All figures: a row for each axis, and one for each calibration.
@@ -201,7 +207,7 @@ fn errors(trend: &Trend, days: axis::Axis) -> Chart {
         };
         let mut errors = points(|of| of.errors);
         // A line does not go on from a jump, or where it is none.
-        if drift.is_line {
+        if drift.is_line != Some(false) {
             errors.extend(forecast(trend, axis, days.1));
         }
         let mut marks = vec![
@@ -230,7 +236,11 @@ pub fn page(
     let last_day = trend.calibrations.last().map_or(0.0, |last| last.day);
     let first = first_to_end(trend).map(|(_, drift)| drift);
     let end = first.and_then(|drift| drift.days[0]);
-    let is_open = first.is_some() || trend.drifts.iter().any(|drift| !drift.is_line);
+    let is_open = first.is_some()
+        || trend
+            .drifts
+            .iter()
+            .any(|drift| drift.is_line == Some(false));
     // As far again as the calibrations reach, or a little beyond the limit.
     let beyond = end.map_or(last_day, |end| (1.1 * end).min(2.0 * last_day));
     let days = axis::Axis(0.0, last_day + beyond);

@@ -65,7 +65,12 @@ fn an_even_drift_reaches_the_limit_on_its_day() {
     assert!((f64::from((date - last.date.date()).get_days()) - day).abs() <= 1.0);
     // Errors beyond the limit need no drift.
     let days = [0.0, 1.0, 2.0, 3.0];
-    let beyond = super::drift(&DMatrix::zeros(4, 4), &days, 0.0, (1e-6, Some(0.9e-6)));
+    let beyond = super::drift(
+        &DMatrix::zeros(4, 4),
+        &days,
+        Some(0.0),
+        (1e-6, Some(0.9e-6)),
+    );
     assert_eq!(beyond.map(|of| of.days), Some([Some(0.0); 3]));
     // No limit, no date.
     assert_eq!(found.drifts[1].days, [None; 3]);
@@ -117,11 +122,6 @@ fn a_time_with_a_zone_is_an_instant() {
     }
 }
 
-/// A blob with its posterior: a budget from a fit, and errors of the gains, of B twice and of C three times as large.
-fn known(mut blob: Blob, gain_error: f64) -> Blob {
-    let stage = shipped::stage();
-    let parameters = FieldParameters::from_set(&blob.1, &stage).expect("of the field model");
-    let noise = Noise {
 #[test]
 fn a_time_with_a_zone_and_a_date_without_one_are_compared_by_their_days() {
     let before = |own, other| assert!(is_before(own, other) && !is_before(other, own));
@@ -134,6 +134,11 @@ fn a_time_with_a_zone_and_a_date_without_one_are_compared_by_their_days() {
     even("yesterday", "2026-11-26");
 }
 
+/// A blob with its posterior: a budget from a fit, and errors of the gains, of B twice and of C three times as large.
+fn known(mut blob: Blob, gain_error: f64) -> Blob {
+    let stage = shipped::stage();
+    let parameters = FieldParameters::from_set(&blob.1, &stage).expect("of the field model");
+    let noise = Noise {
         white_m: [0.5e-6; 3],
         drift: [0.0; 3],
     };
@@ -261,13 +266,33 @@ fn changes_beyond_the_errors_are_not_on_a_line_and_have_no_date() {
     };
     let jumped = found(1.0, 1e-5);
     let drift = &jumped.drifts[0];
-    assert_eq!((drift.jump, drift.is_line), (None, false), "{drift:?}");
+    assert_eq!(
+        (drift.jump, drift.is_line),
+        (None, Some(false)),
+        "{drift:?}"
+    );
     assert_eq!(drift.days, [None; 3]);
     assert!(drift.per_day > 0.0 && drift.interval.is_some());
     let said = shown::answer(&jumped);
     assert!(said.contains("off its line, beyond the errors"), "{said}");
     let [even, within] = [found(0.0, 1e-5), found(1.0, 1e-2)];
-    assert!(even.drifts[0].is_line && within.drifts[0].is_line);
+    assert_eq!(
+        [&even, &within].map(|of| of.drifts[0].is_line),
+        [Some(true); 2]
+    );
+}
+
+#[test]
+fn a_blob_without_posterior_does_not_tell_whether_the_changes_are_on_a_line() {
+    let blobs = [0.0, 2e-3, 0.0, 2e-3].iter().enumerate().map(|(k, gain)| {
+        let blob = blob(DAYS_APART * k as f64, 1.0 - gain, "S");
+        if k == 1 { blob } else { known(blob, 1e-5) }
+    });
+    let mut blobs: Vec<Blob> = blobs.collect();
+    blobs[1].1.fit.rms = [1e-3; 3];
+    let found = Trend::new(&blobs, &shipped::stage()).expect("a trend");
+    assert_eq!(found.drifts.map(|drift| drift.is_line), [None; 3]);
+    assert!(shown::warnings(&found)[0].starts_with("whether the changes are on a line"));
 }
 
 #[test]
