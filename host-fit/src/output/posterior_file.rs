@@ -191,11 +191,12 @@ fn is_covariance(matrix: &DMatrix<f64>) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use hallstage_calibration::recalibrate::Certificates;
+    use hallstage_input::dataset::Dataset;
 
-    fn known() -> StoredPosterior {
+    pub fn known() -> StoredPosterior {
         known_with_rows(COUNT)
     }
 
@@ -246,6 +247,14 @@ mod tests {
             from_bytes(&bytes),
             Ok((Sha256::digest(b"blob").into(), with_temperature))
         );
+    }
+
+    #[test]
+    fn a_posterior_of_any_number_of_logs_can_be_read() {
+        let mut known = known_with_rows(COUNT + 6);
+        known.marks = vec![u32::MAX; 1 << 18];
+        let bytes = to_bytes(b"blob", &known.with_logs(&Dataset::default()));
+        assert!((bytes.len() as u64) < BYTES_MAX / 2, "{}", bytes.len());
     }
 
     #[test]

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// Marks of a log.
 const MARKS: usize = 256;
+/// Marks that are kept.
+const MARKS_MAX: usize = 256 * MARKS;
 /// Marks that a log and the logs of a fit share only where it is one of them, or a part: 1 s of 30 in half of
 /// the cases, 2 s always.
 const SHARED_MIN: usize = 8;
@@ -35,7 +37,7 @@ pub struct StoredPosterior {
     pub budget: Option<Budget>,
     /// The largest motion with good errors, without correction.
     pub up_to: Option<UpTo>,
-    /// Marks of the logs that the blob was fitted to.
+    /// Marks of the logs that the blob was fitted to, of the latest 256.
     pub marks: Vec<u32>,
     /// The certificates of it, and of the calibrations before it.
     pub certificates: Certificates,
@@ -107,6 +109,8 @@ impl StoredPosterior {
         for log in &dataset.logs {
             self.marks.extend(marks(dataset, log).iter().take(MARKS));
         }
+        let beyond = self.marks.len().saturating_sub(MARKS_MAX);
+        self.marks.drain(..beyond);
         self
     }
 }
