@@ -125,7 +125,7 @@ pub fn write(
         warnings,
         report: Some(report),
         as_found: None,
-        certificates: about.certificates,
+        certificates: Some(about.certificates),
     };
     let html = source.html().map_err(internal)?;
     if path.is_dir() {

@@ -121,7 +121,7 @@ pub(super) fn add_page(
         let bytes = blob_file::to_bytes(blob, &report.set)?;
         let provenance = &mut source.provenance;
         provenance.add_bytes(blob, &bytes, "parameter blob, judged");
-        source.certificates.clone_from(&evaluation.certificates);
+        source.certificates = Some(evaluation.certificates.clone());
         source.warnings.clone_from(&report.warnings);
         source.report = Some(report);
         Ok(source.html()?)

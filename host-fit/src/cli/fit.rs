@@ -14,6 +14,7 @@ use crate::report::parameters;
 use crate::report::table::Table;
 use crate::report::text::as_text;
 use clap::Args;
+use hallstage_calibration::recalibrate::Certificates;
 use hallstage_calibration::words;
 use hallstage_input::log::ReadOptions;
 use std::path::{Path, PathBuf};
@@ -91,14 +92,9 @@ impl FitJob<'_> {
         let kept = kept.zip(outcome.fitted.as_ref().ok());
         let mut known = outcome.known(&log.dataset);
         let mut warnings = words::messages(&log.warnings);
-        let certificates = kept.map(|(path, fit)| kept::certificates(path, &fit.set));
-        let certificates = certificates.transpose().unwrap_or_else(|cause| {
-            warnings.push(format!(
-                "whether the number of the certificate is taken is not known: {cause}"
-            ));
-            None
+        let mut certificates = kept.map_or_else(Certificates::default, |(path, fit)| {
+            kept::certificates(path, &fit.set, &[], &mut warnings)
         });
-        let mut certificates = certificates.unwrap_or_default();
         page.add(&mut outputs, || {
             let what = (self.title, self.order.settings.serial.as_str());
             let mut source = page.source(what, logs, log_and_stage, subject);
@@ -113,7 +109,9 @@ impl FitJob<'_> {
                 provenance.add_bytes(path, &blob, "parameter blob, written");
                 source.warnings.clone_from(&warnings);
             }
-            source.certificates = certificates.clone();
+            // Without a posterior an issued number is not kept.
+            let has_place = kept.is_none() || known.is_some();
+            source.certificates = has_place.then(|| certificates.clone());
             if let Some(number) = source.number() {
                 certificates = std::mem::take(&mut certificates).with(number);
             }

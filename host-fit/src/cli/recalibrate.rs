@@ -13,7 +13,7 @@ use crate::report::text::as_text;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::diagnose::refusal::Refusal;
-use hallstage_calibration::recalibrate::{Certificates, RecalibrateError, StoredPosterior};
+use hallstage_calibration::recalibrate::{RecalibrateError, StoredPosterior};
 use hallstage_input::log::ReadOptions;
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::model::Model;
@@ -90,6 +90,10 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     args.json.add(&mut outputs, &updated.figures)?;
     let set = &updated.new.set;
     let mut number = None;
+    if let Some(known) = &mut updated.new.known {
+        let before = &known.certificates.before;
+        known.certificates = kept::certificates(&args.out, set, before, &mut updated.warnings);
+    }
     let (report, as_found) = updated.report(&old, &log, &stage);
     args.report.add(&mut outputs, || {
         let what = (CERTIFICATE, set.serial.as_str());
@@ -107,8 +111,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         source.report = Some(&report);
         source.as_found = Some(as_found);
         let known = updated.new.known.as_ref();
-        source.certificates =
-            known.map_or_else(Certificates::default, |of| of.certificates.clone());
+        source.certificates = known.map(|known| known.certificates.clone());
         number = source.number();
         Ok(source.html()?)
     })?;

@@ -84,7 +84,7 @@ impl ReportArgs {
             warnings: words::messages(&log.warnings),
             report: None,
             as_found: None,
-            certificates: Certificates::default(),
+            certificates: Some(Certificates::default()),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::blob_file;
 use super::error::{OutputError, OutputProblem};
-use super::posterior_file::{self, PosteriorFileError};
+use super::posterior_file;
 use flate2::read::MultiGzDecoder;
 use hallstage_calibration::recalibrate::Certificates;
 use runtime::ParameterSet;
@@ -54,12 +54,13 @@ pub fn check_own(path: &Path, starts: &[&[u8]]) -> Result<(), OutputError> {
 /// # Errors
 /// [`OutputProblem::NotOwn`], [`OutputProblem::IsCertificate`].
 pub fn check_own_page(path: &Path) -> Result<(), OutputError> {
-    check_own(path, &[PAGE.as_bytes()])?;
     let start = start_of(path).unwrap_or_default();
-    let title = start.strip_prefix(PAGE.as_bytes());
-    match title.is_some_and(|title| title.starts_with(CERTIFICATE.as_bytes())) {
-        true => Err(OutputError::new(path, OutputProblem::IsCertificate)),
-        false => Ok(()),
+    match start.strip_prefix(PAGE.as_bytes()) {
+        Some(title) if title.starts_with(CERTIFICATE.as_bytes()) => {
+            Err(OutputError::new(path, OutputProblem::IsCertificate))
+        }
+        None if !start.is_empty() => Err(OutputError::new(path, OutputProblem::NotOwn)),
+        _ => Ok(()),
     }
 }
 
@@ -77,17 +78,31 @@ pub fn check_own_blob(path: &Path, serial: &str) -> Result<(), OutputError> {
     }
 }
 
-/// The certificates of a blob that takes the place of the one that is there: where it is the same one, it keeps its own.
-///
-/// # Errors
-/// Why the posterior beside that blob does not tell.
-pub fn certificates(path: &Path, set: &ParameterSet) -> Result<Certificates, PosteriorFileError> {
+/// The certificates of a blob that takes the place of one of its stage: where it is the same one, it keeps its own. The numbers
+/// `before` are of the blob that it was recalibrated from. A warning says where the posterior that is there does not tell.
+pub fn certificates(
+    path: &Path,
+    set: &ParameterSet,
+    before: &[String],
+    warnings: &mut Vec<String>,
+) -> Certificates {
     let there = blob_file::read(path).ok();
+    let there = there.filter(|there| there.serial == set.serial);
     let is_same = there.as_ref() == Some(set);
     let known = there.map(|there| posterior_file::read(&there, path));
-    let known = known.transpose()?.flatten();
-    let there = known.map(|known| known.certificates).unwrap_or_default();
-    Ok(if is_same { there } else { there.next() })
+    let known = known.transpose().unwrap_or_else(|cause| {
+        warnings.push(format!(
+            "whether the number of the certificate is taken is not known: {cause}"
+        ));
+        None
+    });
+    let there = known.flatten().map(|known| known.certificates);
+    let there = there.unwrap_or_default();
+    let mut all = if is_same { there } else { there.next() };
+    let new = before.iter().filter(|number| !all.has(number));
+    let new: Vec<String> = new.cloned().collect();
+    all.before.extend(new);
+    all
 }
 
 /// The first bytes of a file, unpacked; none of devices and pipes.

@@ -119,3 +119,29 @@ fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     other.discard();
     assert_eq!(names(folder.path()), ["bus.log"]);
 }
+
+#[test]
+fn a_blob_has_the_numbers_of_the_one_that_it_replaces_and_of_the_one_that_it_comes_from() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("params.bin");
+    let set = include_bytes!("../../../runtime/examples/field.bin");
+    let set = runtime::ParameterSet::from_bytes(set).expect("sound");
+    let mut outputs = Outputs::default();
+    let known = posterior_file::tests::known();
+    posterior_file::add_calibration(&mut outputs, &path, &set, Some(&known)).expect("added");
+    outputs.commit().expect("written");
+    let numbers = |set: &runtime::ParameterSet, before: &[&str]| {
+        let before: Vec<String> = before.iter().map(|of| (*of).to_owned()).collect();
+        let mut warnings = Vec::new();
+        let found = kept::certificates(&path, set, &before, &mut warnings);
+        assert!(warnings.is_empty());
+        (found.own, found.before.join(" "))
+    };
+    let given = |own: &str, before: &str| (own.to_owned(), before.to_owned());
+    assert_eq!(numbers(&set, &["6"]), given("7", "6"));
+    let mut other = set;
+    other.created = "2026-11-26".try_into().expect("short");
+    assert_eq!(numbers(&other, &["6", "8"]), given("", "6 7 8"));
+    other.serial = "OTHER".try_into().expect("short");
+    assert_eq!(numbers(&other, &["8"]), given("", "8"));
+}

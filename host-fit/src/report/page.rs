@@ -53,8 +53,8 @@ pub struct Source<'a> {
     pub report: Option<&'a Report>,
     /// The calibration before it was brought up to date.
     pub as_found: Option<AsFound>,
-    /// The certificates of the blob, and of those before it.
-    pub certificates: Certificates,
+    /// The certificates of the blob, and of those before it; `None` of a blob without a posterior, which keeps no number.
+    pub certificates: Option<Certificates>,
 }
 
 /// A calibration before it was brought up to date.
@@ -152,9 +152,11 @@ impl Source<'_> {
             .iter()
             .filter_map(|(text, name)| is_open(text).then_some(*name));
         let [number, ..] = &self.stage.certificate.texts;
-        let is_taken = !number.is_empty() && self.certificates.has(number);
-        let taken = is_taken.then_some("a number of its own");
-        texts.chain(open).chain(taken).collect()
+        let number = match &self.certificates {
+            None => Some("a posterior, which keeps the number"),
+            Some(of) => (!number.is_empty() && of.has(number)).then_some("a number of its own"),
+        };
+        texts.chain(open).chain(number).collect()
     }
 
     /// The facts of a certificate besides the verdict: laboratory, operator, date, stage, range of validity.
@@ -175,7 +177,7 @@ impl Source<'_> {
                 ["number".to_owned(), self.provenance.document(&self.facts)],
             );
         }
-        let Certificates { own, before } = &self.certificates;
+        let Certificates { own, before } = &self.certificates.clone().unwrap_or_default();
         let of_blob = "certificate of the blob";
         let fact = match (self.title == CERTIFICATE, before.last()) {
             (true, before) => before.map(|of| ["latest certificate before", of].map(str::to_owned)),

@@ -61,7 +61,7 @@ fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> S
         warnings: Vec::new(),
         report: None,
         as_found: None,
-        certificates: Certificates::default(),
+        certificates: Some(Certificates::default()),
     }
 }
 
@@ -197,6 +197,13 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
     assert!(foot(&full) && !foot(&refused) && !foot(&open));
     assert!(open.contains("<td>number</td><td>document "));
     stage.certificate.texts[2] = "a customer".to_owned();
+    let without_posterior = Source {
+        certificates: None,
+        ..source(&stage, &dataset, subject(End::Written, &diagnosis))
+    };
+    let report = without_posterior.html().expect("a page");
+    assert!(report.contains("<h1>Calibration report</h1>"));
+    assert!(report.contains("<td>a posterior, which keeps the number</td>"));
     let of = |title, [own, before]: [&str; 2]| {
         let own = Certificates::default()
             .with(before.to_owned())
@@ -207,7 +214,7 @@ fn a_page_is_a_certificate_once_its_fields_are_filled_in() {
         };
         let source = Source {
             title,
-            certificates,
+            certificates: Some(certificates),
             ..source(&stage, &dataset, subject(End::Written, &diagnosis))
         };
         source.html().expect("a page")

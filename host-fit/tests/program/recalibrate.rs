@@ -323,6 +323,19 @@ fn a_number_is_taken_once_a_certificate_has_it_and_no_other_calibration_takes_it
         3,
         &["2025-12-31", "2026-01-02"],
     );
+    // The blob at --out has its number, too.
+    let stage = bench.text("stage.toml");
+    bench.write("stage.toml", stage.replace("of the number", "another one"));
+    for (what, page) in [("gains", "certificate"), ("gain", "report")] {
+        let command = format!("recalibrate cal.bin new.csv --what {what} --out new.bin");
+        let page = format!("Calibration {page}");
+        title(&format!("{command} --created 2026-02-02"), &page);
+    }
+    // A number that is kept nowhere is not issued.
+    let fit_31 = "fit log.csv --out 31.bin --model 31 --serial HS-3 --created 2026-02-02";
+    let page = title(fit_31, "Calibration report");
+    says(&page, "a posterior, which keeps the number");
+    bench.write("stage.toml", stage);
     for command in [
         "recalibrate cal.bin new.csv --what gains --out new.bin",
         &format!("fit new.csv {fit}"),
