@@ -28,8 +28,7 @@ pub(super) struct CheckArgs {
 pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let json = args.json.path.as_deref();
     super::check_outputs([json], Some(&args.report), args.logs.inputs())?;
-    args.json.check_own()?;
-    args.report.check_own()?;
+    args.report.check_own(&args.json)?;
     if args.logs.paths.is_empty() {
         args.logs.stage.read()?;
         return terminal::print("no fault found in the stage file\n");

@@ -52,8 +52,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         .into_iter()
         .chain(args.logs.inputs());
     super::check_outputs([args.json.path.as_deref()], Some(&args.report), inputs)?;
-    args.json.check_own()?;
-    args.report.check_own()?;
+    args.report.check_own(&args.json)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     let order = EvalOrder {
         zeros: args.delta,

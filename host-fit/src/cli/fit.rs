@@ -47,8 +47,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     if !args.options.force {
         let serial = args.options.serial.as_ref();
         kept::check_own_blob(&args.out, serial.map_or("", |serial| serial.as_str()))?;
-        args.json.check_own()?;
-        args.report.check_own()?;
+        args.report.check_own(&args.json)?;
     }
     let created = args.report.created.clone().unwrap_or_default();
     let order = args.options.order(created, interrupt::watch());

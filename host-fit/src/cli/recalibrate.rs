@@ -58,8 +58,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         Some(&args.report),
         inputs.chain(old_posterior.as_deref()),
     )?;
-    args.json.check_own()?;
-    args.report.check_own()?;
+    args.report.check_own(&args.json)?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     kept::check_own_blob(&args.out, &old.serial)?;
     args.report.check_not_before(&args.params, &old)?;

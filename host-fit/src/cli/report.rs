@@ -1,6 +1,6 @@
 //! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
 
-use super::arguments::{Logs, blob_text};
+use super::arguments::{Json, Logs, blob_text};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{OutputError, Outputs, kept, make_folder};
@@ -57,8 +57,9 @@ impl ReportArgs {
         Some(self.folder.as_ref()?.join("index.html"))
     }
 
-    /// Refuses to replace a page of another program, or a certificate.
-    pub(super) fn check_own(&self) -> Result<(), OutputError> {
+    /// Refuses to replace a page of another program, a certificate, or a file that holds no figures.
+    pub(super) fn check_own(&self, json: &Json) -> Result<(), OutputError> {
+        json.check_own()?;
         let page = self.page();
         page.map_or(Ok(()), |page| kept::check_own_page(&page))
     }

@@ -31,8 +31,7 @@ pub(super) fn run(args: &TrendArgs) -> Result<(), HostError> {
     let inputs = args.blobs.iter().chain([&args.stage.path]);
     let inputs = inputs.map(PathBuf::as_path);
     super::check_outputs([args.json.path.as_deref()], Some(&args.report), inputs)?;
-    args.json.check_own()?;
-    args.report.check_own()?;
+    args.report.check_own(&args.json)?;
     let stage = args.stage.read()?;
     let mut provenance = Provenance::new(std::env::args_os());
     provenance.add_file(&args.stage.path, "stage as designed");

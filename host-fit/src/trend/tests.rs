@@ -8,9 +8,9 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::posterior::Posterior;
 use hallstage_solver::estimator::terms::COUNT;
 use hallstage_solver::estimator::whiten::Noise;
-use proptest::prelude::*;
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+
+mod line;
+mod words;
 
 const DAYS_APART: f64 = 30.0;
 /// Gains lose this in a day, a part.
@@ -74,14 +74,6 @@ fn an_even_drift_reaches_the_limit_on_its_day() {
     assert_eq!(beyond.map(|of| of.days), Some([Some(0.0); 3]));
     // No limit, no date.
     assert_eq!(found.drifts[1].days, [None; 3]);
-}
-
-#[test]
-fn two_calibrations_have_a_line_without_an_interval() {
-    let found = trend(&[0.0; 2]);
-    assert_eq!(found.drifts[0].interval, None);
-    assert!(found.drifts[0].days[0].is_some());
-    assert!(shown::answer(&found).contains("a line through two calibrations has no interval"));
 }
 
 #[test]
@@ -213,89 +205,6 @@ fn a_change_of_a_gain_has_the_errors_of_both_calibrations() {
 }
 
 #[test]
-fn a_jump_is_named_with_its_dates_and_has_no_line() {
-    let scatter = [0.0, 1e-6, -2e-6, 1e-6, -1e-6, 2e-6];
-    let jumped = |size: f64| {
-        let errors = (0..6).map(|k| scatter[k] + LOSS_PER_DAY * DAYS_APART * k as f64);
-        let errors: Vec<f64> = errors
-            .enumerate()
-            .map(|(k, of)| of - size * f64::from(k > 3))
-            .collect();
-        trend(&errors)
-    };
-    let found = jumped(2e-3);
-    let (first, size) = found.drifts[0].jump.expect("a jump");
-    let expected = 2e-3 * 0.5 * shipped::stage().motion.axes[0].service;
-    assert_eq!(first, 4);
-    assert!((size / expected - 1.0).abs() < 0.02, "{size} {expected}");
-    assert_eq!(found.drifts[0].days, [None; 3]);
-    let said = shown::answer(&found);
-    assert!(
-        said.starts_with("X jumped by 0.50 µm (rms) between 2026-04-01 and 2026-05-01"),
-        "{said}"
-    );
-    assert!(said.contains("a line does not describe this") && !said.contains("No limit"));
-    // Neither scatter alone nor an even drift is a jump.
-    assert_eq!(jumped(0.0).drifts[0].jump, None);
-    assert_eq!(trend(&[0.0; 6]).drifts[0].jump, None);
-}
-
-#[test]
-fn the_drift_is_the_slope_of_scattered_changes_with_its_interval() {
-    let found = trend(&[0.0, 3e-3, 0.0, 3e-3]);
-    // Of the losses, and 0.2 of the scatter for each month of 30 days.
-    let slope = (2.0 * 3e-3 / 10.0 / DAYS_APART - LOSS_PER_DAY).abs();
-    let expected = slope * 0.5 * shipped::stage().motion.axes[0].service;
-    let drift = &found.drifts[0];
-    assert!((drift.per_day / expected - 1.0).abs() < 0.02, "{drift:?}");
-    let [low, high] = drift.interval.expect("an interval");
-    assert!(low < drift.per_day && drift.per_day < high);
-}
-
-#[test]
-fn changes_beyond_the_errors_are_not_on_a_line_and_have_no_date() {
-    let stage = shipped::stage();
-    // Two jumps.
-    let gains = [0.0, 0.0, 2e-3, 2e-3, 4e-3, 4e-3, 4e-3];
-    let found = |size: f64, error: f64| {
-        let blobs = gains.iter().enumerate().map(|(k, gain)| {
-            let gain = 1.0 - size * gain - LOSS_PER_DAY * DAYS_APART * k as f64;
-            known(blob(DAYS_APART * k as f64, gain, "S"), error)
-        });
-        Trend::new(&blobs.collect::<Vec<_>>(), &stage).expect("a trend")
-    };
-    let jumped = found(1.0, 1e-5);
-    let drift = &jumped.drifts[0];
-    assert_eq!(
-        (drift.jump, drift.is_line),
-        (None, Some(false)),
-        "{drift:?}"
-    );
-    assert_eq!(drift.days, [None; 3]);
-    assert!(drift.per_day > 0.0 && drift.interval.is_some());
-    let said = shown::answer(&jumped);
-    assert!(said.contains("off its line, beyond the errors"), "{said}");
-    let [even, within] = [found(0.0, 1e-5), found(1.0, 1e-2)];
-    assert_eq!(
-        [&even, &within].map(|of| of.drifts[0].is_line),
-        [Some(true); 2]
-    );
-}
-
-#[test]
-fn a_blob_without_posterior_does_not_tell_whether_the_changes_are_on_a_line() {
-    let blobs = [0.0, 2e-3, 0.0, 2e-3].iter().enumerate().map(|(k, gain)| {
-        let blob = blob(DAYS_APART * k as f64, 1.0 - gain, "S");
-        if k == 1 { blob } else { known(blob, 1e-5) }
-    });
-    let mut blobs: Vec<Blob> = blobs.collect();
-    blobs[1].1.fit.rms = [1e-3; 3];
-    let found = Trend::new(&blobs, &shipped::stage()).expect("a trend");
-    assert_eq!(found.drifts.map(|drift| drift.is_line), [None; 3]);
-    assert!(shown::warnings(&found)[0].starts_with("whether the changes are on a line"));
-}
-
-#[test]
 fn a_forced_blob_beyond_the_limit_of_the_noise_has_reached_it() {
     let mut blobs = [0.0, 30.0].map(|day| known(blob(day, 1.0, "S"), 0.05));
     let days = |blobs: &[Blob]| {
@@ -305,138 +214,4 @@ fn a_forced_blob_beyond_the_limit_of_the_noise_has_reached_it() {
     assert_eq!(days(&blobs), [None; 3]);
     blobs[1].1.fit.forced = true;
     assert_eq!(days(&blobs), [Some(0.0); 3]);
-}
-
-#[test]
-fn a_forced_blob_is_named() {
-    let mut blobs = [0.0, 30.0].map(|day| blob(day, 1.0, "S"));
-    blobs[0].1.fit.forced = true;
-    let found = Trend::new(&blobs, &shipped::stage()).expect("a trend");
-    let warnings = shown::warnings(&found);
-    assert!(
-        warnings
-            .iter()
-            .any(|of| of.starts_with("day 0 was refused")),
-        "{warnings:?}"
-    );
-    assert!(
-        !warnings
-            .iter()
-            .any(|of| of.starts_with("day 30 was refused"))
-    );
-}
-
-#[test]
-fn a_figure_has_one_key_whatever_its_value() {
-    let keys = |found: &Trend| -> Vec<Vec<String>> {
-        let json = serde_json::to_value(shown::figures(found)).expect("JSON");
-        let axes = json["axes"].as_array().expect("axes").iter();
-        axes.map(|axis| axis.as_object().expect("an axis").keys().cloned().collect())
-            .collect()
-    };
-    let all = [trend(&[0.0; 2]), trend(&[0.0; 6])];
-    let jumped = trend(&[0.0, 0.0, 0.0, 0.0, 2e-3, 2e-3]);
-    assert!(jumped.drifts[0].jump.is_some());
-    let [x, y, rz] = &keys(&jumped)[..] else {
-        panic!("three axes")
-    };
-    assert!(x.iter().any(|key| key == "drift_a_month_um") && x == y);
-    assert!(rz.iter().any(|key| key == "jump_urad"));
-    assert!(all.iter().all(|found| keys(found) == keys(&jumped)));
-}
-
-#[test]
-fn an_interval_without_an_end_is_said_in_words() {
-    let mut found = trend(&[0.0; 4]);
-    let said = |found: &Trend, days: [Option<f64>; 3]| {
-        let mut found = found.clone();
-        found.drifts[0].days = days;
-        let json = serde_json::to_string(&shown::figures(&found)).expect("JSON");
-        assert!(!json.contains("no date"), "{json}");
-        (shown::answer(&found), json)
-    };
-    let (answer, _) = said(&found, [Some(10.0), Some(5.0), Some(20.0)]);
-    assert!(
-        answer.ends_with("on 2026-04-11; between 2026-04-06 and 2026-04-21 (95 %)."),
-        "{answer}"
-    );
-    let (answer, _) = said(&found, [Some(10.0), Some(5.0), None]);
-    assert!(
-        answer.ends_with("on 2026-04-11; not before 2026-04-06, or never (95 %)."),
-        "{answer}"
-    );
-    let (answer, json) = said(&found, [None, Some(5.0), None]);
-    let words =
-        "may reach their limit of 1.00 µm from 2026-04-06 on (95 %); by the line they do not.";
-    assert!(answer.ends_with(words), "{answer}");
-    assert!(json.contains(r#""reached":null"#) && json.contains(r#""earliest":"2026-04-06""#));
-    // The page is not marked as good, and the errors end at their limit in the chart.
-    let page =
-        |found: &Trend| shown::page(found, Vec::new(), Provenance::default()).expect("a page");
-    found.drifts[0].days = [None, Some(5.0), None];
-    assert!(page(&found).contains("verdict limited"));
-    found.drifts[0].days = [None; 3];
-    assert!(page(&found).contains("verdict good"));
-}
-
-#[test]
-fn the_curve_of_the_errors_grows_with_the_drift_to_the_limit_and_beyond() {
-    let found = trend(&[0.0; 4]);
-    let day = found.drifts[0].days[0].expect("a date");
-    let curve = shown::forecast(&found, 0, 90.0 + day);
-    assert!(
-        curve[0].0 == 90.0 && (curve[0].1 - 0.5).abs() < 1e-6,
-        "{:?}",
-        curve[0]
-    );
-    let (last, error) = curve[curve.len() - 1];
-    assert!(
-        (last - 90.0 - day).abs() < 1e-9 && (error - 1.0).abs() < 1e-9,
-        "{last} {error}"
-    );
-}
-
-#[test]
-fn the_quantile_of_student_is_that_of_tables() {
-    for (freedom, table) in [(1, 12.706), (4, 2.776), (5, 2.571), (8, 2.306), (30, 2.042)] {
-        assert!((student(freedom) / table - 1.0).abs() < 0.01, "{freedom}");
-    }
-}
-
-#[test]
-fn nineteen_of_twenty_intervals_hold_the_true_day_of_a_scattered_drift() {
-    let mut random = ChaCha8Rng::seed_from_u64(5);
-    // A third of the change between two calibrations, to both sides.
-    let mut held = 0;
-    for _ in 0..60 {
-        let count = random.random_range(3..8);
-        let errors: Vec<f64> = (0..count)
-            .map(|_| random.random_range(-2e-5..2e-5))
-            .collect();
-        let [_, earliest, latest] = trend(&errors).drifts[0].days;
-        let is_early = earliest.is_some_and(|day| day <= true_days());
-        held += u32::from(is_early && latest.is_none_or(|day| day >= true_days()));
-    }
-    assert!((54..60).contains(&held), "{held} of 60");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
-
-    /// The errors in service grow by the drift alone: they are at the limit on the day that is named.
-    #[test]
-    fn on_the_day_that_is_named_the_errors_are_at_the_limit(
-        errors in prop::collection::vec(-5e-5..5e-5, 2..7),
-    ) {
-        let found = trend(&errors);
-        let (drift, own) = (&found.drifts[0], found.calibrations[errors.len() - 1].errors[0]);
-        for (day, per_day) in drift.days.into_iter().zip([Some(drift.per_day), drift.interval.map(|ends| ends[1])]) {
-            if let (Some(day), Some(per_day)) = (day, per_day) {
-                let then = own.hypot(per_day * day);
-                prop_assert!((then / 1e-6 - 1.0).abs() < 1e-9, "{then}");
-            }
-        }
-        let [day, earliest, latest] = drift.days.map(|day| day.unwrap_or(f64::INFINITY));
-        prop_assert!(earliest <= day && day <= latest, "{:?}", drift.days);
-    }
 }
