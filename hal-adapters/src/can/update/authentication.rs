@@ -3,9 +3,7 @@
 //! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain with the node's number, the
 //! nonce, the blob padded with zeros, and a last block of four words. These are the two words of the command
 //! ([`Command::payload`], number and token first), the length of the blob in bytes, and its CRC-32C; the last
-//! two are zero for a command without a blob. Words have 32 bits, lowest byte first. CMAC is written here on
-//! the block cipher of a library: over whole blocks it takes a few lines, and they cannot panic. (The crate
-//! `cmac` 0.8.0 can, as the linker shows at opt-level "s".)
+//! two are zero for a command without a blob. Words have 32 bits, lowest byte first.
 
 use super::staging::blob_crc;
 use super::tell::Identity;
@@ -13,7 +11,7 @@ use crate::can::NodeNumber;
 use crate::can::command::Command;
 use crate::can::e2e::Payload;
 use aes::Aes128Enc;
-use aes::cipher::{BlockCipherEncrypt, KeyInit};
+use cmac::{Cmac, KeyInit, Mac};
 
 /// A key of AES-128, one for each stage.
 pub type Key = [u8; 16];
@@ -30,7 +28,7 @@ const BLOCK: usize = 16;
 /// The first words under every tag; the fourth is the node's number. So a tag that the same key made for another purpose
 /// or another node is not accepted.
 const DOMAIN: [u32; 3] = [0x6c6c_6168, 0x6761_742d, 0x0033_762d];
-/// Bytes of the stack that a tag leaves behind: round keys, and what else follows from the key.
+/// Bytes of the stack below a tag: there the cipher has its round keys, which give the key.
 const WIPED_BYTES: usize = 1536;
 
 /// A tag from a host, and the nonce that it must answer.
@@ -52,49 +50,13 @@ impl Tag {
     }
 }
 
-fn encrypt(cipher: &Aes128Enc, block: u128) -> u128 {
-    let mut bytes = block.to_le_bytes().into();
-    cipher.encrypt_block(&mut bytes);
-    u128::from_le_bytes(bytes.into())
-}
-
 const fn in_one_block([a, b, c, d]: [u32; 4]) -> u128 {
     (d as u128) << 96 | (c as u128) << 64 | (b as u128) << 32 | a as u128
-}
-
-/// AES-CMAC over whole blocks; `last` is the last one.
-fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_BYTES] {
-    let cipher = Aes128Enc::new(key.into());
-    let chain = blocks.fold(0, |chain, block| encrypt(&cipher, chain ^ block));
-    // The subkey K1 is E(0) times x in GF(2^128), most significant bit first.
-    let zero = encrypt(&cipher, 0).swap_bytes();
-    let reduction = if zero >> 127 == 1 { 0x87 } else { 0 };
-    let k1 = (zero << 1 ^ reduction).swap_bytes();
-    encrypt(&cipher, chain ^ last ^ k1).to_le_bytes()
 }
 
 /// The tag of a command to a node. `blob` is the blob of a commit, and empty for any other command. Leaves nothing of the
 /// key on the stack.
 pub fn tag(
-    key: &Key,
-    node: NodeNumber,
-    nonce: &Nonce,
-    command: &Command,
-    blob: &[u8],
-) -> [u8; TAG_BYTES] {
-    let tag = unwiped_tag(key, node, nonce, command, blob);
-    wipe_stack();
-    tag
-}
-
-/// Overwrites the stack that the function called before has used.
-#[inline(never)]
-fn wipe_stack() {
-    core::hint::black_box(&mut [0u8; WIPED_BYTES]);
-}
-
-#[inline(never)]
-fn unwiped_tag(
     key: &Key,
     node: NodeNumber,
     nonce: &Nonce,
@@ -113,7 +75,23 @@ fn unwiped_tag(
     let Payload { short, long } = command.payload();
     let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
     let last = in_one_block([short, long, bytes, blob_crc(blob).unwrap_or(0)]);
-    cmac(key, head.into_iter().chain(padded), last)
+    let tag = cmac(key, head.into_iter().chain(padded).chain([last]));
+    wipe_stack();
+    tag
+}
+
+/// AES-CMAC over blocks.
+#[inline(never)]
+fn cmac(key: &Key, blocks: impl Iterator<Item = u128>) -> [u8; TAG_BYTES] {
+    let mut mac = <Cmac<Aes128Enc> as KeyInit>::new(key.into());
+    blocks.for_each(|block| mac.update(&block.to_le_bytes()));
+    mac.finalize().into_bytes().into()
+}
+
+/// Overwrites the stack that the function called before has used.
+#[inline(never)]
+fn wipe_stack() {
+    core::hint::black_box(&mut [0u8; WIPED_BYTES]);
 }
 
 #[cfg(test)]
@@ -123,14 +101,13 @@ mod tests {
     use super::*;
     use crate::can::command::Request;
     use crate::can::update::UpdateRequest;
-    use cmac::{Cmac, Mac};
 
     const fn commit(sequence: u32) -> Command {
         Command::new(Request::Update(UpdateRequest::Commit { sequence }), 0xab)
     }
 
     #[test]
-    fn the_tag_equals_another_implementation_for_any_length() {
+    fn the_tag_is_the_cmac_of_the_described_bytes_for_any_length() {
         for bytes in 0..200_u32 {
             let key = [bytes as u8 ^ 0x5a; 16];
             let nonce = [bytes, 0x8000_0001, !bytes, 7];
@@ -153,6 +130,14 @@ mod tests {
             let want: [u8; 16] = other.finalize().into_bytes().into();
             assert_eq!(tag(&key, node, &nonce, &commit(bytes + 1), &blob), want);
         }
+    }
+
+    #[test]
+    fn an_example_of_rfc_4493_gives_its_tag() {
+        let key = 0x2b7e_1516_28ae_d2a6_abf7_1588_09cf_4f3c_u128.to_be_bytes();
+        let block = 0x6bc1_bee2_2e40_9f96_e93d_7e11_7393_172a_u128.swap_bytes();
+        let want = 0x070a_16b4_6b4d_4144_f79b_dd9d_d04a_287c_u128.to_be_bytes();
+        assert_eq!(cmac(&key, [block].into_iter()), want);
     }
 
     #[test]
