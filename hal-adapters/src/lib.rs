@@ -1,5 +1,5 @@
-//! Between the runtime and the world: converters on SPI, the CAN protocol of the stage, and
-//! what a computer needs to take part in it.
+//! Between the runtime and the world: converters on SPI, the CAN protocol of the stage,
+//! and the bus for a program on Linux.
 //!
 //! The crate is `no_std`, allocates nothing and reads no clock: time arrives as data. Only
 //! `socketcan` needs an operating system. No feature is on by default.

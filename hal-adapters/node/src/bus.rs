@@ -17,7 +17,7 @@ const COMMANDS_PER_TICK: u8 = 3;
 const APART_MS: u32 = 500;
 
 /// A CAN controller with mailboxes. It receives the frames of [`hal_adapters::can::Message::Command`] and
-/// [`hal_adapters::can::Message::UpdateData`] of its node, and need not receive any others. Nothing here waits.
+/// [`hal_adapters::can::Message::UpdateData`] of its node, and need not receive any others. No function waits.
 pub trait Can {
     /// Takes the frames back that have not left.
     fn take_back(&mut self);

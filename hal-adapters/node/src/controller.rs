@@ -5,10 +5,10 @@ use crate::board::Board;
 use crate::bus::{Bus, Can};
 use crate::constants::Constants;
 use crate::fpu;
-use crate::node::{Facts, Node, Parameters, SampleFault};
+use crate::node::{Facts, Node, Parameters, SampleFault, Settings};
 use crate::records::Records;
 use crate::retained::{FaultKind, Retained, Step};
-use crate::schedule::{Period, Schedule, Tick};
+use crate::schedule::{Schedule, Tick};
 use crate::start_up::Before;
 use crate::store::Slots;
 use crate::telemetry::STAGE;
@@ -16,8 +16,6 @@ use embedded_storage::nor_flash::MultiwriteNorFlash;
 use hal_adapters::adc::FrameSampler;
 use hal_adapters::can::Layout;
 use hal_adapters::can::status::{BoardFacts, board_check};
-use hal_adapters::can::update::Identity;
-use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{PlanarPose, Status};
 
 /// Longest wait of a reset or an erase for the answers to leave, ms.
@@ -34,17 +32,6 @@ pub struct Parts<A, C, F, B> {
     pub slots: Slots<F>,
     /// All else.
     pub board: B,
-}
-
-/// The stage and its servo.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings<'s> {
-    /// Serial number, key, version of the program.
-    pub identity: Identity<'s>,
-    /// The servo period.
-    pub period: Period,
-    /// Limits of rest at the zero.
-    pub rezero_limits: ZeroOffsetSettings,
 }
 
 /// A controller that ticks.
@@ -83,14 +70,10 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
             slots,
             mut board,
         } = parts;
-        let Settings {
-            identity,
-            period,
-            rezero_limits,
-        } = settings;
+        let period = settings.period;
         board.feed_watchdog();
         board.record().begin(Step::Parameters);
-        let (mut records, refusal) = Records::start(slots, before.choice, identity.serial);
+        let (mut records, refusal) = Records::start(slots, before.choice, settings.identity.serial);
         // After a warm start the FPU may have any settings. These give the host's arithmetic.
         fpu::restore();
         let is_sound = runtime::arithmetic::check().is_ok() && fpu::defaults_are_sound();
@@ -103,8 +86,7 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         let stop = before.stop(loaded.is_some());
         let parameters = Parameters::at_start(loaded, refusal, stop, is_sound);
         let layout = Layout::from_bits(A::CODE_BITS);
-        let node = Node::new(parameters, before.by_fault, layout, identity, period);
-        let mut node = node.with_rezero_limits(rezero_limits);
+        let mut node = Node::new(parameters, before.by_fault, layout, settings);
         let zero_lost = before.restore_zero(&mut node, blob);
         let zero = node.zero();
         // Without a running blob the record stays for a later start.

@@ -29,6 +29,17 @@ const NOTHING: Reading = Reading {
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
 
+/// The stage and its servo.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings<'s> {
+    /// Serial number, key, version of the program.
+    pub identity: Identity<'s>,
+    /// The servo period.
+    pub period: Period,
+    /// Limits of rest at the zero.
+    pub rezero_limits: ZeroOffsetSettings,
+}
+
 /// Input of a tick from the rest of the program and the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
@@ -78,9 +89,14 @@ impl<'s> Node<'s> {
         parameters: Parameters,
         watchdog_reset: bool,
         layout: Layout,
-        identity: Identity<'s>,
-        period: Period,
+        settings: Settings<'s>,
     ) -> Self {
+        let Settings {
+            identity,
+            period,
+            rezero_limits,
+        } = settings;
+        let service = Service::new(period.ticks_per_s());
         Self {
             parameters,
             period,
@@ -88,7 +104,7 @@ impl<'s> Node<'s> {
             layout,
             sender: PoseSender::default(),
             temperatures: TemperatureSender::START,
-            service: Service::new(period.ticks_per_s()),
+            service: service.with_rezero_limits(rezero_limits),
             has_key: identity.key.is_some(),
             receiver: Receiver::new(identity, period.ticks_per_s()),
             ticks: 0,
@@ -96,15 +112,6 @@ impl<'s> Node<'s> {
             fpu_restored: 0,
             board_checks: 0,
             bus_off_sent: 0,
-        }
-    }
-
-    /// Re-zeros within the limits of this stage.
-    #[must_use]
-    pub fn with_rezero_limits(self, limits: ZeroOffsetSettings) -> Self {
-        Self {
-            service: self.service.with_rezero_limits(limits),
-            ..self
         }
     }
 

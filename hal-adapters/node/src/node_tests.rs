@@ -41,15 +41,13 @@ fn without_a_key_the_servo_counts_as_on_unless_the_line_says_off() {
         (Some(false), Outcome::ServoOn),
         (None, Outcome::ServoOn),
     ] {
-        let period = Period::from_us(2000).expect("a period");
         let parameters = Parameters::at_start(Some(loaded()), None, None, true);
-        let identity = Identity {
-            serial: None,
-            key: None,
-            program_version: 1,
-            ..Identity::default()
+        let settings = Settings {
+            identity: Identity::default(),
+            period: Period::from_us(2000).expect("a period"),
+            rezero_limits: ZeroOffsetSettings::default(),
         };
-        let mut node = Node::new(parameters, false, Layout::Bits24, identity, period);
+        let mut node = Node::new(parameters, false, Layout::Bits24, settings);
         let facts = Facts {
             servo_off_pin: line,
             ..Facts::default()

@@ -12,7 +12,7 @@ use hal_adapters::can::NodeNumber;
 use hal_adapters::can::status::{bit, board_check};
 use hal_adapters::can::update::Identity;
 use runtime::zero_offset::ZeroOffsetSettings;
-use stage_node::controller::Settings;
+use stage_node::node::Settings;
 use stage_node::schedule::Period;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, DMA2, GPIOA, GPIOB, GPIOC, SPI1};

@@ -32,7 +32,8 @@ use hal_adapters::adc::{Ads8688, Channels};
 use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::update::Identity;
 use runtime::zero_offset::ZeroOffsetSettings;
-use stage_node::controller::{Controller, Parts, Settings};
+use stage_node::controller::{Controller, Parts};
+use stage_node::node::Settings;
 use stage_node::retained::{FaultKind, Step};
 use stage_node::schedule::Period;
 use stage_node::start_up::{Before, Cause};
@@ -74,7 +75,7 @@ fn main() -> ! {
         can: Mcp2515::new(bus),
         slots: Slots {
             flash: Flash::<FLASH, Blocking, FLASH_BYTES>::new_blocking(p.FLASH),
-            // Both slots are at the end: `memory.x` leaves them free.
+            // The last two sectors: `memory.x` gives the program the flash before them.
             first: (FLASH_BYTES - 2 * ERASE_SIZE) as u32,
             // The brown-out detector resets the chip, which runs from this flash.
             supply_is_low: || false,
