@@ -20,7 +20,8 @@
 //!
 //! 1. A pulse on SYNC/RESET at the trigger restarts the filters of all channels.
 //! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 207 us later the last edge of DRDY gives the ends of all conversions, those
-//!    to come as well. The period between edges is measured at the start.
+//!    to come as well. The period between edges and their place behind the trigger are measured at the start. An edge that
+//!    is more than 3 us off its place is a disturbance, and the sample is refused.
 //! 3. Frames empty the store of two conversions. The driver follows the store by the times of frames and conversions
 //!    (`conversions.rs`), and returns the first codes with a known conversion, settled in any case: 3.5 periods
 //!    after the trigger. (By table 8-3 a filter may begin 75 us after a resynchronisation; 8.5.2 wants three periods.)
@@ -41,12 +42,12 @@
 //! | SPI, gap before each frame | never interrupted | 10 us | 30 us | 100 us |
 //! |---|---|---|---|---|
 //! | 1 MHz, any; 4 MHz, any | all refused | all refused | all refused | all refused |
-//! | 5.25 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 12 % | 5.9 us, 16 % |
-//! | 5.25 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 5 % | 5.9 us, 12 % | 5.9 us, 16 % |
+//! | 5.25 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 1 % | 5.9 us, 6 % | 5.9 us, 9 % |
+//! | 5.25 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 4 % | 5.9 us, 7 % | 5.9 us, 11 % |
 //! | 5.25 MHz, 20 and 50 us | all refused | all refused | all refused | all refused |
-//! | 10 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 1 % | 5.9 us, 14 % |
-//! | 10 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 5 % | 5.9 us, 10 % |
-//! | 10 MHz, 20 us | 5.9 us, 0 % | 5.9 us, 2 % | 5.9 us, 10 % | 5.9 us, 12 % |
+//! | 10 MHz, 1 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 1 % | 5.9 us, 9 % |
+//! | 10 MHz, 5 us | 5.9 us, 0 % | 5.9 us, 0 % | 5.9 us, 1 % | 5.9 us, 8 % |
+//! | 10 MHz, 20 us | 5.9 us, 0 % | 5.9 us, 2 % | 5.9 us, 3 % | 5.9 us, 9 % |
 //! | 10 MHz, 50 us | all refused | all refused | all refused | all refused |
 //!
 //! A pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
@@ -83,7 +84,7 @@ use crc::{CRC_16_IBM_3740, Crc};
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
-use timing::{PERIOD_NS, follow};
+use timing::follow;
 
 /// Words of a frame: response, eight codes, check.
 const WORDS: usize = 2 + INPUTS;
@@ -127,8 +128,6 @@ const F_RESYNC: u16 = 0x4000;
 /// So many ticks in a row without a resynchronisation are a fault.
 const UNSYNCED_TICKS: u8 = 2;
 
-/// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
-const SYNC_US: u32 = 2;
 /// By this much a pulse comes later that follows an ignored one.
 const SHIFT_US: u32 = 2;
 
@@ -152,7 +151,10 @@ pub struct Ads131m08<SPI, SYNC, READY> {
     start_failed: bool,
     temperatures: Held,
     triggered_us: u32,
+    /// From edge to edge of DRDY; 0 until it is measured.
     period_ns: u32,
+    /// Of the edges behind the trigger and whole periods.
+    place_ns: u32,
     /// Length of the last frame.
     frame_us: u32,
 }
@@ -185,7 +187,8 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
             start_failed: false,
             temperatures: Held::MISSING,
             triggered_us: 0,
-            period_ns: PERIOD_NS,
+            period_ns: 0,
+            place_ns: 0,
             frame_us: 0,
         }
     }
@@ -260,7 +263,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
         compare(CLOCK, found, self.wanted(CLOCK))?;
         let found = self.exchange(NULL, 0)?.response;
         compare(MODE_REGISTER, found, MODE_WANTED)?;
-        self.measure_period()
+        self.measure_edges()
     }
 
     /// Whether the part reported a resynchronisation in this tick.
@@ -309,6 +312,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
         self.status_is_next = false;
         self.temperatures = Held::MISSING;
         self.turn = MODE_REGISTER;
+        self.period_ns = 0;
         let result = self.try_start();
         // A reset is no help where DRDY shows no conversion.
         self.start_failed = !matches!(result, Ok(()) | Err(AdcError::UnknownInstant));
@@ -319,15 +323,10 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
         if self.unsynced_ticks > 0 {
             self.wait_us(SHIFT_US);
         }
-        self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()))?;
-        self.triggered_us = self.ready.now_us();
-        // Earlier edges do not count.
-        let _ = self.ready.fell_us();
         if core::mem::take(&mut self.start_failed) {
-            return Ok(());
+            return self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()));
         }
-        self.wait_us(SYNC_US);
-        self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))
+        self.pulse()
     }
 
     fn sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<SPI::Error>> {

@@ -4,19 +4,19 @@ use super::conversions::Conversions;
 use super::{Ads131m08, Frame};
 use crate::adc::{AdcError, DataReady};
 use core::ops::RangeInclusive;
-use embedded_hal::digital::OutputPin;
+use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::SpiDevice;
 
-/// A conversion, ns, with CLKIN at 8 MHz.
-pub(super) const PERIOD_NS: u32 = 64_000;
-/// The measured period lies in this range.
-const PERIODS_NS: RangeInclusive<u32> = 60_000..=68_000;
-/// The period is measured over this time: four conversions.
-const MEASURE_US: u32 = 260;
-/// Among more periods one that is 6 % off would be miscounted.
-const COUNT_MAX: u32 = 8;
-/// From a change of the oversampling until the first edge has come in any case, us.
+/// A conversion takes so long, us: 64 with CLKIN at 8 MHz.
+const PERIODS_US: RangeInclusive<u32> = 60..=68;
+/// Conversions that are measured.
+const MEASURED: u32 = 4;
+/// From a trigger until an edge has come in any case, us.
 const FIRST_EDGE_US: u32 = 200;
+/// An edge that lies further from its place behind the trigger is none of a conversion, ns.
+const EDGE_OFF_NS: u32 = 3000;
+/// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
+const SYNC_US: u32 = 2;
 /// By a clock that is 6 % fast an edge comes this much later, us.
 const SLOW_EDGE_US: u32 = 12;
 /// From the last sample of a conversion to its edge, ns: 0 or 11 us.
@@ -25,31 +25,47 @@ const EDGE_LATE_NS: u32 = 5_500;
 const LOOKS_MAX: u32 = 100_000;
 
 impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, READY> {
-    /// The time from edge to edge by the controller's clock.
-    pub(super) fn measure_period(&mut self) -> Result<(), AdcError<SPI::Error>> {
+    /// Starts the filters anew.
+    pub(super) fn pulse(&mut self) -> Result<(), AdcError<SPI::Error>> {
+        self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()))?;
+        self.triggered_us = self.ready.now_us();
+        // Earlier edges do not count.
+        let _ = self.ready.fell_us();
+        self.wait_us(SYNC_US);
+        self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))
+    }
+
+    /// The time from edge to edge by the controller's clock, and the place of the edges behind a trigger.
+    pub(super) fn measure_edges(&mut self) -> Result<(), AdcError<SPI::Error>> {
+        self.pulse()?;
         self.wait_us(FIRST_EDGE_US);
         let first_us = self.ready.fell_us().ok_or(AdcError::UnknownInstant)?;
-        let from_us = self.ready.now_us();
-        let (mut last_us, mut shortest_us) = (first_us, u32::MAX);
-        for _ in 0..LOOKS_MAX {
-            if let Some(us) = self.ready.fell_us() {
-                shortest_us = shortest_us.min(us.wrapping_sub(last_us));
-                last_us = us;
-            }
-            if self.ready.now_us().wrapping_sub(from_us) > MEASURE_US {
-                break;
-            }
+        let mut last_us = first_us;
+        for _ in 0..MEASURED {
+            let fell_us = self.next_edge_us(last_us);
+            let fell_us = fell_us.filter(|us| PERIODS_US.contains(&us.wrapping_sub(last_us)));
+            last_us = fell_us.ok_or(AdcError::UnknownInstant)?;
         }
-        let span_ns = last_us.wrapping_sub(first_us).min(1_000_000) * 1000;
-        let count = (span_ns + PERIOD_NS / 2) / PERIOD_NS;
-        let period_ns = span_ns.checked_div(count).unwrap_or(0);
-        // If the period is a multiple of a conversion, so is the shortest distance of edges.
-        let is_single = shortest_us < PERIOD_NS / 1000 * 3 / 2;
-        if count > COUNT_MAX || !is_single || !PERIODS_NS.contains(&period_ns) {
-            return Err(AdcError::UnknownInstant);
-        }
-        self.period_ns = period_ns;
+        self.period_ns = last_us.wrapping_sub(first_us) * 1000 / MEASURED;
+        self.place_ns = self.place_ns(first_us).unwrap_or(0);
         Ok(())
+    }
+
+    /// The edge after another one, if it comes within a period.
+    fn next_edge_us(&mut self, last_us: u32) -> Option<u32> {
+        for _ in 0..LOOKS_MAX {
+            let fell_us = self.ready.fell_us();
+            if fell_us.is_some() || self.ready.now_us().wrapping_sub(last_us) > *PERIODS_US.end() {
+                return fell_us;
+            }
+        }
+        None
+    }
+
+    /// How far an edge lies behind the trigger and whole periods. `None` before the period is known.
+    fn place_ns(&self, edge_us: u32) -> Option<u32> {
+        let since_us = edge_us.wrapping_sub(self.triggered_us).min(1_000_000);
+        (since_us * 1000).checked_rem(self.period_ns)
     }
 
     /// Waits, one us less at most.
@@ -69,7 +85,11 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
             edge_us = self.ready.fell_us()?;
         }
         let is_full = edge_us.wrapping_sub(self.triggered_us) > fills_us;
-        is_full.then(|| Conversions::after(edge_us, self.period_ns))
+        let off_ns = self.place_ns(edge_us)?.abs_diff(self.place_ns);
+        let is_in_place = off_ns.min(self.period_ns - off_ns) <= EDGE_OFF_NS;
+        // The conversion has ended in any case.
+        (0..LOOKS_MAX).find(|_| self.ready.now_us().wrapping_sub(edge_us) > EDGE_OFF_NS / 1000);
+        (is_full && is_in_place).then(|| Conversions::after(edge_us, self.period_ns))
     }
 
     /// A frame, while no conversion ends that a full store would lose.
