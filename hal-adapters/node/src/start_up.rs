@@ -50,7 +50,8 @@ impl Before {
             Cause::PowerOn => Retained::default(),
             Cause::Watchdog | Cause::Reset => kept.unwrap_or_else(Retained::damaged),
         };
-        if cause == Cause::Watchdog {
+        // A fault that was noted may have waited for the watchdog.
+        if cause == Cause::Watchdog && !record.crashed {
             record.note(FaultKind::Watchdog, 0, 0);
         }
         let by_fault = core::mem::take(&mut record.crashed);
@@ -136,6 +137,14 @@ mod tests {
         assert_eq!((first.record.faults, second.record.faults), (1, 1));
         let bitten = Before::new(Cause::Watchdog, Some(run(7, None)));
         assert_eq!((bitten.by_fault, bitten.record.faults), (true, 1));
+        // A panic whose handler waits for the watchdog.
+        let panic = run(7, Some(FaultKind::Panic));
+        let bitten = Before::new(Cause::Watchdog, Some(panic));
+        assert_eq!(
+            (bitten.record.fault, bitten.record.faults),
+            (panic.fault, 1)
+        );
+        assert_eq!(bitten.stop, None);
     }
 
     #[test]
