@@ -54,18 +54,21 @@ impl Constants {
 }
 
 /// A word of a decoder. By assembler, because the bytes between fields have no value in Rust.
-#[cfg(target_arch = "arm")]
+#[cfg(any(target_arch = "arm", target_arch = "riscv32"))]
 fn word(at: usize) -> u32 {
     let word: u32;
     // SAFETY: reads an aligned word of a value that the caller borrows.
     unsafe {
+        #[cfg(target_arch = "arm")]
         core::arch::asm!("ldr {}, [{}]", out(reg) word, in(reg) at, options(nostack, readonly, preserves_flags));
+        #[cfg(target_arch = "riscv32")]
+        core::arch::asm!("lw {}, 0({})", out(reg) word, in(reg) at, options(nostack, readonly, preserves_flags));
     }
     word
 }
 
-/// A host's memory is not checked.
-#[cfg(not(target_arch = "arm"))]
+/// On other cores, a host's for one, memory is not checked.
+#[cfg(not(any(target_arch = "arm", target_arch = "riscv32")))]
 const fn word(_: usize) -> u32 {
     0
 }
