@@ -159,8 +159,8 @@ pub const STAGE_NODE: NodeNumber = match option_env!("STAGE_NODE") {
     None => NodeNumber::TABLE,
 };
 
-/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000. At most half of the watchdog's period.
-const PERIOD: Period = match Period::from_us(match option_env!("STAGE_PERIOD_US") {
+/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000.
+pub const PERIOD: Period = match Period::from_us(match option_env!("STAGE_PERIOD_US") {
     Some(digits) => number(digits),
     None => 2000,
 }) {

@@ -2,13 +2,16 @@
 //! the power. (The HAL writes the period before it starts the oscillator and does not wait
 //! until it is taken over: the first period would be 16 s.)
 
-use crate::board::INTERNAL_MHZ;
+use crate::board::{INTERNAL_MHZ, PERIOD};
 use crate::wait::Stopwatch;
 use stm32f4xx_hal::pac::{DBGMCU, IWDG};
 
-/// The watchdog resets this long after it was last fed, ms. That is ten ticks by the nominal
-/// clock of its oscillator, 32 kHz; 13.6 to 37.6 ms by its range, 17 to 47 kHz.
-pub const PERIOD_MS: u16 = 20;
+/// The watchdog resets this long after it was last fed, ms: ten ticks, and 20 ms at least. That is by the nominal clock of
+/// its oscillator, 32 kHz; by its range, 17 to 47 kHz, 20 ms are 13.6 to 37.6 ms.
+const PERIOD_MS: u16 = match PERIOD.us() / 100 {
+    ms @ 20.. => ms as u16,
+    _ => 20,
+};
 
 /// While a sector may be erased, which takes 500 ms at most: 2 s by the nominal clock, 1.36 s at
 /// least.
