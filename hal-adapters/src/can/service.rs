@@ -4,7 +4,8 @@
 //! Setting or clearing the zero moves the pose at once, and a stage with its servo on follows. Both are refused
 //! unless the servo was declared off ([`Request::ServoOff`]; the declaration expires) and the board's service
 //! pin, if it has one, agrees. A node with a key obeys such a request only with a tag
-//! ([`Command::needs_authority`]); a node without a key obeys only while the line says that the servo is off.
+//! ([`Command::needs_authority`]); a node without a key obeys only while the line says that the servo is off. A node without
+//! key and line obeys any sender's declaration: a controller of that kind says "on" in place of the line.
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;

@@ -10,10 +10,6 @@
 #include "hall_runtime.h"
 #include <stdio.h>
 
-#if HALL_RUNTIME_VERSION < 0x000100
-#error "needs hall_runtime 0.1.0"
-#endif
-
 /* memory.x gives these; their addresses are the values. */
 extern const uint8_t _parameter_slot_0[], _parameter_slot_bytes[];
 
