@@ -54,8 +54,8 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// From a start near the truth, with these faults and the usual noise.
-    pub(super) fn first(
+    /// Without faults, from a start near the truth, with the noise of the residuals that these faults leave.
+    pub(super) fn new(
         means: &Means,
         start: &FieldParameters,
         faults: &[Vec<[f64; 3]>],
@@ -65,24 +65,25 @@ impl Estimate {
             values: DVector::from_fn(UNKNOWNS, |k, _| values.get(k).copied().unwrap_or(0.0)),
             offsets: vec![[0.0; 3]; means.rows.movements.len()],
         };
-        let noise = Noise {
+        let mut noise = Noise {
             white_m: means.white_m,
             drift: USUAL_DRIFT,
         };
-        Self::descend(means, start.places, at, noise, faults)
-    }
-
-    /// Without faults, with the noise of the residuals.
-    pub(super) fn faultless(self, means: &Means) -> Option<Self> {
-        let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
-        let blocks = (means.rows).evaluate(&probes(parameters), &self.dynamics(), &at.offsets);
-        let covariance = self.curvature.inverse();
+        let first = Self::descend(means, start.places, at, noise, faults)?;
+        let (probes, offsets) = (probes(&first.parameters), &first.at.offsets);
+        let mut blocks = (means.rows).evaluate(&probes, &first.dynamics(), offsets);
+        for (fault, size) in faults.iter().zip(first.sizes()) {
+            for (block, by) in blocks.iter_mut().zip(fault) {
+                (0..3).for_each(|k| block.residual_m[k] -= size * by[k]);
+            }
+        }
+        let covariance = first.without_faults(PER_PROBE)?.inverse();
         noise.drift = drift(&means.rows, &blocks, noise.white_m, &covariance);
         for (drift, usual) in noise.drift.iter_mut().zip(USUAL_DRIFT) {
             // A free walk swallows faults.
             *drift = drift.min(usual * libm::exp(DRIFT_SPREAD));
         }
-        Self::descend(means, parameters.places, self.at, noise, &[])
+        Self::descend(means, start.places, first.at, noise, &[])
     }
 
     fn descend(
@@ -243,12 +244,15 @@ impl Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::faults::effects::{Effects, Shape, Suspect};
     use hallstage_input::shipped::stage;
     use hallstage_simulate::assembly::Assembly;
-    use hallstage_simulate::protocol::Protocol;
+    use hallstage_simulate::pose::StagePose;
+    use hallstage_simulate::protocol::{Protocol, Run};
     use hallstage_simulate::recording::record;
     use hallstage_simulate::sensors::SensorErrors;
     use hallstage_solver::estimator::paper::Parameters;
+    use std::f64::consts::TAU;
 
     #[test]
     fn terms_that_are_larger_than_usual_make_also_the_hidden_ones_uncertain() {
@@ -260,7 +264,7 @@ mod tests {
         let log = log.dataset(&stage).expect("a triangle");
         let designed = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
         let means = Means::new(&log, &stage, &designed, true);
-        let mut estimate = Estimate::first(&means, &designed, &[]).expect("an estimate");
+        let mut estimate = Estimate::new(&means, &designed, &[]).expect("an estimate");
         let own = estimate.curvature.inverse();
         assert_eq!(estimate.covariance(), own, "usual magnets");
         for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
@@ -271,6 +275,40 @@ mod tests {
         // uz3 is as uncertain as its prior, eta is known from the log.
         assert!(grown(term("uz3")) > 3.0, "{}", grown(term("uz3")));
         assert!(grown(term("eta")) < 2.0, "{}", grown(term("eta")));
+    }
+
+    #[test]
+    fn lags_that_a_log_leaves_open_do_not_pass_for_drift() {
+        let stage = stage();
+        // Eight seconds of a run of thirty, whose tones are hardly apart.
+        let pose = |row: i32| {
+            let time_s = 3.7 + stage.servo_period_s * f64::from(row);
+            let tone = |axis: usize, cycles: f64| {
+                let angle = TAU * cycles * time_s / 30.0 + 1.7 * axis as f64;
+                stage.motion.axes[axis].service * libm::sin(angle)
+            };
+            StagePose {
+                planar: [tone(0, 13.0), tone(1, 17.0), tone(2, 14.0)],
+                vertical: [tone(3, 19.0), tone(4, 16.0), tone(5, 11.0)],
+            }
+        };
+        let run = Run::planned((0..4000).map(pose).collect());
+        let log = record(
+            &stage,
+            &Assembly::draw(&stage, 2),
+            run,
+            &SensorErrors::USUAL,
+            2,
+        );
+        let log = log.expect("clear").dataset(&stage).expect("a triangle");
+        let designed = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
+        let means = Means::new(&log, &stage, &designed, false);
+        let effects = Effects::new(&means, &stage, &designed, 0.0);
+        let late = [4, 5, 0, 1].map(Suspect::late);
+        let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
+        let estimate = Estimate::new(&means, &designed, &late).expect("an estimate");
+        let [x, y, _] = estimate.noise.drift;
+        assert!(x < 1.5e-7 && y < 1.5e-7, "{x} {y}");
     }
 
     fn term(name: &str) -> usize {

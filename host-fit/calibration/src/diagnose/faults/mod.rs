@@ -109,8 +109,7 @@ pub fn find_faults(
     // Probes and beams may be late, and a lag is no noise.
     let late = [4, 5, 0, 1].map(Suspect::late);
     let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
-    let first = Estimate::first(&finder.means, start, &late)?;
-    finder.faults(&first.faultless(&finder.means)?)
+    finder.faults(&Estimate::new(&finder.means, start, &late)?)
 }
 
 /// A log with the calibration that it is judged by.

@@ -47,12 +47,9 @@ pub(super) fn misfit(means: &Means, estimate: &Estimate) -> f64 {
     let groups = groups(means, TOGETHER_S);
     // The parameters follow up to half of the slow residual.
     let freedom = 0.5 * 3.0 * groups.len() as f64;
-    let slow: f64 = groups
-        .into_iter()
-        .map(|group| power(estimate, group).sum())
-        .sum();
+    let slow = (groups.into_iter()).map(|group| power(estimate, group).sum());
     let all = estimate.chi_squared / means.freedom();
-    (slow / freedom).max(all).max(1.0)
+    (slow.sum::<f64>() / freedom).max(all).max(1.0)
 }
 
 /// The beam with a noise that explains the residual, if the noise of no probe does; in service there are no beams.
@@ -62,10 +59,8 @@ pub(super) fn noisy_beam(effects: &Effects, estimate: &Estimate) -> Option<usize
     // Chance makes half of this sum of squares.
     let least = 2.0 * BAND_CLEAR * (6.0 * groups.len() as f64).sqrt();
     for group in groups {
-        let Some(to_white) = Matrix3::from(estimate.gains[group.start].factor)
-            .transpose()
-            .try_inverse()
-        else {
+        let factor = Matrix3::from(estimate.gains[group.start].factor).transpose();
+        let Some(to_white) = factor.try_inverse() else {
             continue;
         };
         let by_channel = effects.by_channel(group.start);
@@ -90,10 +85,8 @@ fn power(estimate: &Estimate, group: Range<usize>) -> Vector3<f64> {
 fn sum(estimate: &Estimate, group: Range<usize>) -> Vector3<f64> {
     let share = 1.0 / (group.len() as f64).sqrt();
     let rows = estimate.rows[group].iter();
-    let sum: Vector3<f64> = rows
-        .map(|row| Vector3::from(row.map(|of| of[RESIDUAL])))
-        .sum();
-    sum * share
+    let residuals = rows.map(|row| Vector3::from(row.map(|of| of[RESIDUAL])));
+    residuals.sum::<Vector3<f64>>() * share
 }
 
 /// Variances of A, B, C by slow residuals beyond noise and drift, m2: by a wrong calibration, and by what may be a drift of

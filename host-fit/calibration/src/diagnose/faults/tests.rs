@@ -63,10 +63,7 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
     let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
     let parameters = fitted.estimate.parameters;
     let means = Means::new(&dataset, &stage, &parameters, false);
-    let first = Estimate::first(&means, &parameters, &[]);
-    let estimate = first
-        .and_then(|first| first.faultless(&means))
-        .expect("one");
+    let estimate = Estimate::new(&means, &parameters, &[]).expect("one");
     let effects = Effects::new(&means, &stage, &estimate.parameters, estimate.lag_s());
     let candidates = Scan::new(&effects, &estimate).expect("one").faults(true);
     let large = candidates.iter().filter(|candidate| candidate.gain > 300.0);
