@@ -145,8 +145,7 @@ pub fn diagnose_log(
         Ok(fit) => out.add_fit(fit, dataset, stage),
         Err(_) => out.predicted = None,
     }
-    let short = fit_checks::short_movements(fitted.ok(), dataset);
-    out.findings.extend(short);
+    (out.findings).extend(fit_checks::short_movements(fitted.ok(), dataset));
     let columns = ColumnFaults::new(&out.columns, logged, stage, &start);
     out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.bent));
     out.findings.extend(columns.findings);
@@ -348,8 +347,7 @@ pub fn diagnose_blob(
     out.add_faults(dataset, dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
-    out.findings
-        .extend(temperature::missing(temperature, dataset));
+    (out.findings).extend(temperature::missing(temperature, dataset));
     let basis =
         match blob_use {
             BlobUse::Recalibrated(Some(predicted)) => {
@@ -367,8 +365,7 @@ pub fn diagnose_blob(
                 out.findings.extend(at_work.and_then(|of| {
                     range::faster((dataset, &trusted), stage, (errors, corrected), of)
                 }));
-                let rezero = temperature::rezero(temperature, dataset, is_refitted);
-                out.findings.extend(rezero);
+                (out.findings).extend(temperature::rezero(temperature, dataset, is_refitted));
                 Basis::Blob { is_for_service }
             }
         };

@@ -104,9 +104,10 @@ pub fn structure(
 ) -> Option<Finding> {
     let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
-    let mut fitted = fitted(dataset, stage.servo_period_s)?;
-    let strange = (0..3).filter(|&probe| fitted[probe].left > LEFT_MAX);
-    let strange: Vec<Channel> = strange.map(|probe| Channel::SINGLE[probe]).collect();
+    let by_itself = fitted(dataset, stage.servo_period_s);
+    let each = by_itself.iter().flatten().zip(Channel::SINGLE);
+    let strange = each.filter_map(|(of, channel)| (of.left > LEFT_MAX).then_some(channel));
+    let strange: Vec<Channel> = strange.collect();
     let spans = spans(dataset);
     // A probe along an axis that hardly moves shows all but a line.
     let moves = beyond_motion(stage, &spans, &Transform::nothing()) == 0.0;
@@ -117,9 +118,10 @@ pub fn structure(
             ..found
         });
     }
-    if let Some(known) = field {
-        fitted = [0, 1, 2].map(|probe| Fitted::of_field(probe, known));
-    }
+    let fitted = match field {
+        Some(known) => [0, 1, 2].map(|probe| Fitted::of_field(probe, known)),
+        None => by_itself?,
+    };
     let drawing = Drawing::new(stage, field.is_some());
     let distance = |change: &Transform| drawing.distance(&fitted, change);
     let as_logged = distance(&Transform::nothing());
@@ -280,9 +282,11 @@ impl Drawing {
 
     /// Sum of squared differences of three probes over tolerances and uncertainties of the fit.
     fn distance(&self, fitted: &[Fitted; 3], change: &Transform) -> f64 {
-        let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
-        let all = (0..3).map(|probe| of_probe(probe).unwrap_or(f64::INFINITY));
-        all.sum()
+        let of_probe = |probe| {
+            self.distance_of(probe, fitted, change)
+                .unwrap_or(f64::INFINITY)
+        };
+        (0..3).map(of_probe).sum()
     }
 
     fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Transform) -> Option<f64> {
@@ -310,12 +314,15 @@ impl Drawing {
 }
 
 /// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. The
-/// residuals follow the motion, so neighbours are alike.
+/// residuals follow the motion, so neighbours are alike; `None` where too few others show how large they are.
 fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let rows = Rows::new(dataset, &all);
     let apart = all.len().div_ceil(MEANS_MAX);
-    let alike = (ALIKE_S / (period_s * apart as f64)).max(1.0);
+    let count = all.len() as f64 / apart as f64;
+    let others = count.min(all.len() as f64 * period_s / ALIKE_S);
+    // For the mean of a variance over all that its residuals allow.
+    let freedom = others - (UNKNOWNS + rows.movements.len() + 2) as f64;
     let of_probe = |probe: usize| {
         let mut at = SVector::<f64, UNKNOWNS>::zeros();
         let mut covariance = SMatrix::zeros();
@@ -333,14 +340,12 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
                 SVector::<f64, { UNKNOWNS + 1 }>::from_iterator(parts)
             };
             let mut products = SMatrix::<f64, { UNKNOWNS + 1 }, { UNKNOWNS + 1 }>::zeros();
-            let mut count = 0.0;
             for movement in rows.movement_rows() {
                 let some = rows.rows[movement].iter().step_by(apart);
                 let columns: Vec<_> = some.map(column).collect();
                 let mean = columns.iter().sum::<SVector<_, _>>() / columns.len() as f64;
                 let off = columns.iter().map(|column| column - mean);
                 off.for_each(|off| products.ger(1.0, &off, &off, 1.0));
-                count += columns.len() as f64;
             }
             let rest = products[(UNKNOWNS, UNKNOWNS)] / count;
             variance = variance.max(rest);
@@ -349,7 +354,7 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
             own += SMatrix::from_diagonal_element(open);
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
-            covariance = factor.inverse() * (rest * alike);
+            covariance = factor.inverse() * (rest * count / freedom);
             left = rest / variance;
         }
         let found = Fitted {
@@ -357,7 +362,8 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
             covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
             left,
         };
-        found.at.iter().all(|x| x.is_finite()).then_some(found)
+        let is_known = freedom > 0.0 && found.at.iter().all(|x| x.is_finite());
+        is_known.then_some(found)
     };
     Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
 }
