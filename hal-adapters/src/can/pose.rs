@@ -25,7 +25,7 @@ use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
 use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::sensor::time_frame;
-use super::table::{Message, VERTICAL_TICKS};
+use super::table::Message;
 use embedded_can::Frame;
 use runtime::{PlanarPose, RawFrame, Reading, Status};
 
@@ -40,6 +40,9 @@ pub const fn status_to_bus(status: Status) -> u32 {
     status.bits() & (u32::MAX >> (32 - SHORT_BITS))
 }
 
+/// Binary logarithm of the ticks between two frames of a vertical axis. The axes take turns.
+const VERTICAL_SHIFT: u32 = 2;
+
 const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
     let payload = Payload {
         short: status_to_bus(status),
@@ -48,69 +51,31 @@ const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) 
     Coded::new(message, counter, payload)
 }
 
-/// The three frames of the planar pose; `counter` rises by one from call to call.
-#[inline]
-pub const fn planar_frames(reading: &Reading, counter: u32) -> [Coded; 3] {
-    let (p, status) = (&reading.pose.planar, reading.status);
-    [
-        axis_frame(Message::PoseX, counter, p.x_m, status),
-        axis_frame(Message::PoseY, counter, p.y_m, status),
-        axis_frame(Message::PoseRz, counter, p.rz_rad, status),
-    ]
-}
-
 /// Numbers the pose frames of one node and decides when the vertical axes are sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PoseSender {
     tick: u32,
-    /// Binary logarithm of the ticks between two frames of a vertical axis.
-    vertical_shift: u32,
-}
-
-impl Default for PoseSender {
-    fn default() -> Self {
-        Self::new(VERTICAL_TICKS)
-    }
 }
 
 impl PoseSender {
-    /// Sends each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16; any other
-    /// number is rounded down to the next such (0 counts as 1).
-    pub const fn new(vertical_ticks: u8) -> Self {
-        let ticks = if vertical_ticks > 16 {
-            16
-        } else {
-            vertical_ticks | (vertical_ticks == 0) as u8
-        };
-        Self {
-            tick: 0,
-            vertical_shift: ticks.ilog2(),
-        }
-    }
-
     /// The frames of one tick: X, Y, Rz; in every [`super::table::SLOW_TICKS`]th tick, together with X, Y and
-    /// Rz of counter 0, number and time of `sampled`; and the vertical axes that are due.
+    /// Rz of counter 0, number and time of `sampled`; in four ticks Z, Rx, Ry, and none.
     /// `sampled` are the codes that were decoded; a tick without codes has no time.
     pub fn frames(
         &mut self,
         reading: &Reading,
         sampled: Option<&RawFrame>,
     ) -> impl Iterator<Item = Coded> + use<> {
-        let (tick, shift) = (self.tick, self.vertical_shift & 0xf);
-        let every = 1u32 << shift;
+        let (tick, pose, status) = (self.tick, reading.pose, reading.status);
         self.tick = tick.wrapping_add(1);
-        let (values, status) = (reading.pose.vertical.to_array(), reading.status);
-        // The axes take turns: no tick carries all three unless every tick does.
-        let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
-        let vertical = due.filter_map(move |(k, (message, value))| {
-            let turn = k.wrapping_mul(every) / 3;
-            (tick & (every - 1) == turn).then(|| axis_frame(message, tick >> shift, value, status))
-        });
+        let planar = PLANAR.into_iter().zip(pose.planar.to_array());
+        let planar = planar.map(move |(message, value)| axis_frame(message, tick, value, status));
         let time = sampled.and_then(|sampled| time_frame(Message::PoseTime, sampled, tick));
-        planar_frames(reading, tick)
-            .into_iter()
-            .chain(time)
-            .chain(vertical)
+        let turn = (tick & ((1 << VERTICAL_SHIFT) - 1)) as usize;
+        let vertical = VERTICAL.into_iter().zip(pose.vertical.to_array()).nth(turn);
+        let vertical = vertical
+            .map(|(message, value)| axis_frame(message, tick >> VERTICAL_SHIFT, value, status));
+        planar.chain(time).chain(vertical)
     }
 }
 

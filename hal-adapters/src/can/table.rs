@@ -87,9 +87,6 @@ messages! {
 /// [`Message::NodeStatus`] and [`Message::Health`].
 pub const SLOW_TICKS: u8 = 16;
 
-/// Default of the vertical pose: each axis in every fourth tick.
-pub const VERTICAL_TICKS: u8 = 4;
-
 /// Bytes of every message.
 pub const FRAME_BYTES: usize = 8;
 

@@ -14,9 +14,6 @@ const TICKS_PER_S: u32 = 1_000_000 / SILENT_US;
 /// Time from pose to pose while the sensors are silent, us.
 const SILENT_US: u32 = 2_000;
 
-/// Ticks between two frames of a vertical axis.
-const VERTICAL_TICKS: u8 = 4;
-
 /// The settings of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeSettings {
@@ -60,7 +57,7 @@ impl Node {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
             tracker: PoseTracker::new(decoder, settings.on_invalid),
-            poses: PoseSender::new(VERTICAL_TICKS),
+            poses: PoseSender::default(),
             service: Service::new(TICKS_PER_S),
             ticks: 0,
         }
