@@ -51,6 +51,20 @@ pub enum Request {
     Update(UpdateRequest),
 }
 
+impl Request {
+    /// Its number and its argument.
+    const fn in_frame(self) -> (u8, u32) {
+        match self {
+            Self::Rezero { ticks } => (1, ticks as u32),
+            Self::Identify { seconds } => (2, seconds as u32),
+            Self::ClearZero => (3, 0),
+            Self::Record { on } => (4, on as u32),
+            Self::ServoOff { seconds } => (5, seconds as u32),
+            Self::Update(request) => request.in_frame(),
+        }
+    }
+}
+
 /// A request with the token of its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Command {
@@ -65,14 +79,7 @@ pub struct Command {
 impl Command {
     /// A command.
     pub const fn new(request: Request, token: u8) -> Self {
-        let number = match request {
-            Request::Rezero { .. } => 1,
-            Request::Identify { .. } => 2,
-            Request::ClearZero => 3,
-            Request::Record { .. } => 4,
-            Request::ServoOff { .. } => 5,
-            Request::Update(request) => request.number(),
-        };
+        let (number, _) = request.in_frame();
         Self {
             request: Some(request),
             number,
@@ -100,11 +107,8 @@ impl Command {
     /// The 52 bits of the frame.
     pub const fn payload(&self) -> Payload {
         let long = match self.request {
-            Some(Request::Rezero { ticks }) => ticks as u32,
-            Some(Request::Identify { seconds } | Request::ServoOff { seconds }) => seconds as u32,
-            Some(Request::Record { on }) => on as u32,
-            Some(Request::Update(request)) => request.argument(),
-            Some(Request::ClearZero) | None => 0,
+            Some(request) => request.in_frame().1,
+            None => 0,
         };
         Payload {
             short: (self.token as u32) << 4 | (self.number & 0xf) as u32,

@@ -72,13 +72,6 @@ impl Service {
         }
     }
 
-    /// Whether codes are sent from the start, as after a request.
-    #[must_use]
-    pub const fn with_recording(mut self, is_on: bool) -> Self {
-        self.is_recording = is_on;
-        self
-    }
-
     /// Re-zeros within these limits in place of [`ZeroOffsetSettings::default`].
     #[must_use]
     pub const fn with_rezero_limits(mut self, limits: ZeroOffsetSettings) -> Self {

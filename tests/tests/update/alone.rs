@@ -9,8 +9,8 @@ use tests::fault::Fault;
 use tests::flash_model::FlashModel;
 use tests::node::Node;
 
-const ACTIVATE: u8 = UpdateRequest::Activate.number();
-const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
+const ACTIVATE: u8 = UpdateRequest::Activate.in_frame().0;
+const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.in_frame().0;
 
 #[test]
 fn on_a_bad_bus_the_update_ends_with_the_blob_bit_for_bit_or_a_refusal() {

@@ -313,7 +313,7 @@ impl<'s> Receiver<'s> {
     }
 }
 
-const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
+const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.in_frame().0;
 
 /// Whether a blob is sound and belongs to the stage. A parameter set has 700 bytes: a function of its own frees
 /// that stack at once.

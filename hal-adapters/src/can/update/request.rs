@@ -37,28 +37,16 @@ pub enum UpdateRequest {
 }
 
 impl UpdateRequest {
-    /// Number of the command in the frame.
-    pub const fn number(&self) -> u8 {
+    /// Number of the command and its argument in the frame.
+    pub const fn in_frame(self) -> (u8, u32) {
         match self {
-            Self::Challenge { .. } => 6,
-            Self::Begin { .. } => 7,
-            Self::Commit { .. } => 9,
-            Self::Abort => 10,
-            Self::Activate => 11,
-            Self::ReadBack { .. } => 13,
-            Self::Tell { .. } => 14,
-        }
-    }
-
-    /// The argument in the frame.
-    pub const fn argument(&self) -> u32 {
-        match *self {
-            Self::Challenge { part: byte }
-            | Self::ReadBack { index: byte }
-            | Self::Tell { page: byte } => byte as u32,
-            Self::Begin { bytes } => bytes as u32,
-            Self::Commit { sequence } => sequence,
-            Self::Abort | Self::Activate => 0,
+            Self::Challenge { part } => (6, part as u32),
+            Self::Begin { bytes } => (7, bytes as u32),
+            Self::Commit { sequence } => (9, sequence),
+            Self::Abort => (10, 0),
+            Self::Activate => (11, 0),
+            Self::ReadBack { index } => (13, index as u32),
+            Self::Tell { page } => (14, page as u32),
         }
     }
 

@@ -51,7 +51,7 @@ fn commands(tracker: &mut PoseTracker) {
     let mut mailbox = Mailbox::default();
     let command = Command::new(black_box(Request::Rezero { ticks: 500 }), 1);
     let sent = mailbox.send(&black_box(Content::Command(command)));
-    let mut service = black_box(Service::new(500).with_recording(true));
+    let mut service = black_box(Service::new(500));
     if let Some(coded) = sent {
         black_box(service.take(&black_box(BusFrame::from(coded)), Some(tracker), None));
     }
