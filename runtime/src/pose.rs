@@ -17,6 +17,7 @@
 //! probe positions are what a calibration finds.
 
 use crate::real::Real;
+use serde::{Deserialize, Serialize};
 
 /// `f` of each of three numbers with its counterpart. It is for code of every tick: at opt-level "s"
 /// `array::from_fn` and nalgebra's operators become loops of three times the instructions.
@@ -26,7 +27,7 @@ pub(crate) fn pairwise(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) ->
 }
 
 /// Motion in the plane, by the Hall probes: X and Y in m, Rz in rad.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct PlanarPose<T> {

@@ -159,7 +159,7 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
             return;
         }
         self.note_facts();
-        let sample = sample.map_err(|fault| SampleFault::from(&fault));
+        let sample = sample.map_err(SampleFault::from);
         let reading = (self.node).tick(sample, &self.facts, &mut self.bus.outbox);
         let is_missing = reading.status.any(Status::TEMPERATURE_MISSING);
         (self.facts).note(board_check::TEMPERATURE_MISSING, is_missing);

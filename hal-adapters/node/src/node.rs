@@ -252,9 +252,7 @@ impl<'s> Node<'s> {
 
     fn send_pose(&mut self, reading: &Reading, sampled: Option<&RawFrame>, outbox: &mut Outbox) {
         let mut frames = self.sender.frames(reading, sampled);
-        if let (Some(x), Some(y), Some(rz)) = (frames.next(), frames.next(), frames.next()) {
-            outbox.push_group(&[x, y, rz]);
-        }
+        outbox.push_group(frames.by_ref().take(3));
         frames.for_each(|frame| outbox.push(frame));
     }
 
@@ -264,11 +262,7 @@ impl<'s> Node<'s> {
         if let Some(time) = frames.next_if(|frame| frame.message == Message::SensorTime) {
             outbox.push(time);
         }
-        match (frames.next(), frames.next(), frames.next()) {
-            (Some(a), Some(b), Some(c)) => outbox.push_group(&[a, b, c]),
-            (Some(a), Some(b), None) => outbox.push_group(&[a, b]),
-            _ => {}
-        }
+        outbox.push_group(frames);
     }
 
     fn decode(&mut self, sample: &Result<RawFrame, SampleFault>) -> Reading {

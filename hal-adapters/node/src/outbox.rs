@@ -37,28 +37,20 @@ impl Outbox {
         }
     }
 
-    /// Whether a frame is still worth sending after its tick.
-    const fn is_lasting(message: Message) -> bool {
-        matches!(message, Message::Answer)
-    }
-
-    /// Adds a frame at the end.
+    /// Adds a frame at the end. Only an answer is still worth sending after its tick.
     pub fn push(&mut self, frame: Coded) {
-        let full = if Self::is_lasting(frame.message) {
-            self.lasting.push_back(frame).is_err()
-        } else {
-            self.fresh.push_back((frame, false)).is_err()
+        let full = match frame.message {
+            Message::Answer => self.lasting.push_back(frame).is_err(),
+            _ => self.fresh.push_back((frame, false)).is_err(),
         };
         self.count_dropped(u32::from(full));
     }
 
     /// Adds a group at the end: up to three frames of this tick with rising identifiers.
-    pub fn push_group(&mut self, frames: &[Coded]) {
-        let mut joins = false;
-        for frame in frames {
-            let full = self.fresh.push_back((*frame, joins)).is_err();
+    pub fn push_group(&mut self, frames: impl Iterator<Item = Coded>) {
+        for (frame, joins) in frames.zip([false, true, true]) {
+            let full = self.fresh.push_back((frame, joins)).is_err();
             self.count_dropped(u32::from(full));
-            joins = true;
         }
     }
 

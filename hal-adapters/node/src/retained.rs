@@ -3,25 +3,22 @@
 //!
 //! After power-on the RAM holds noise and is not read. After any other reset it is used only if its check is right.
 
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicU8, Ordering::Relaxed};
+use hal_adapters::can::status::BoardFacts;
 use runtime::PlanarPose;
-use runtime::blob::CRC;
+use runtime::blob::{CRC, CRC_BYTES};
+use serde::{Deserialize, Serialize};
 
-/// Words of the record with its check.
-pub const WORDS: usize = 10;
-
+/// Bytes of the record with its check.
+const BYTES: usize = 52;
 /// Marks a record of this layout.
-const MAGIC: u32 = 0x5354_4733;
-/// Bits of the first word besides the step.
-const CRASHED_BIT: u32 = 8;
-const PROVEN_BIT: u32 = 9;
-const ACTIVATED_BIT: u32 = 10;
-const EARLY_SHIFT: u32 = 16;
+const MAGIC: u32 = 0x5354_4734;
+
 /// Early faults in a row that stop the program.
 const EARLY_MAX: u8 = 2;
 
 /// The step of the program.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Step {
     /// The start-up is done.
@@ -37,17 +34,6 @@ pub enum Step {
     Parameters = 4,
     /// Sets up the converter.
     Converter = 5,
-}
-
-impl Step {
-    const ALL: [Self; 6] = [
-        Self::Ticking,
-        Self::Clocks,
-        Self::InternalClock,
-        Self::Peripherals,
-        Self::Parameters,
-        Self::Converter,
-    ];
 }
 
 /// A cause of a reset that a healthy controller never has.
@@ -69,7 +55,7 @@ pub enum FaultKind {
 }
 
 /// The last fault, as words.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
     /// The [`FaultKind`] in bits 0 to 7, 0 for none; the [`Step`] in bits 8 to 15.
     pub kind_and_step: u32,
@@ -97,7 +83,7 @@ impl Fault {
 }
 
 /// The record.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Retained {
     /// The step that runs.
     pub step: Step,
@@ -175,60 +161,36 @@ impl Retained {
         }
     }
 
-    /// The words, the check last.
-    pub fn to_words(&self) -> [u32; WORDS] {
-        let zero = self.zero;
-        let content = [
-            MAGIC
-                ^ (self.step as u32
-                    | (self.crashed as u32) << CRASHED_BIT
-                    | (self.proven as u32) << PROVEN_BIT
-                    | (self.activated as u32) << ACTIVATED_BIT
-                    | (self.early_faults as u32) << EARLY_SHIFT),
-            self.fault.kind_and_step,
-            self.fault.address,
-            self.fault.detail,
-            self.faults,
-            self.running,
-            zero.x_m.to_bits(),
-            zero.y_m.to_bits(),
-            zero.rz_rad.to_bits(),
-        ];
-        let [a, b, c, d, e, f, g, h, i] = content;
-        [a, b, c, d, e, f, g, h, i, check(&content)]
+    /// The bytes, the check last.
+    fn to_bytes(self) -> [u8; BYTES] {
+        let mut bytes = [0; BYTES];
+        if let Some((content, check)) = bytes.split_last_chunk_mut() {
+            // The longest record fits.
+            let _ = postcard::to_slice(&(MAGIC, self), content);
+            *check = CRC.checksum(content).to_le_bytes();
+        }
+        bytes
     }
 
-    /// The record in the words, if its check is right.
-    pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
-        let [content @ .., stored] = words;
-        let [state, kind_and_step, address, detail, rest @ ..] = *content;
-        let [faults, running, zero @ ..] = rest;
-        let state = state ^ MAGIC;
-        let step = *Step::ALL.get(usize::from(state as u8))?;
-        (check(content) == *stored).then_some(Self {
-            step,
-            fault: Fault {
-                kind_and_step,
-                address,
-                detail,
-            },
-            faults,
-            crashed: state >> CRASHED_BIT & 1 == 1,
-            proven: state >> PROVEN_BIT & 1 == 1,
-            activated: state >> ACTIVATED_BIT & 1 == 1,
-            early_faults: (state >> EARLY_SHIFT) as u8,
-            running,
-            zero: PlanarPose::from_array(zero.map(f32::from_bits)),
-        })
+    /// The record in the bytes, if its check is right.
+    fn from_bytes(bytes: &[u8; BYTES]) -> Option<Self> {
+        let (content, check) = bytes.split_last_chunk::<CRC_BYTES>()?;
+        let (magic, record) = postcard::from_bytes::<(u32, Self)>(content).ok()?;
+        let is_sound = magic == MAGIC && CRC.checksum(content).to_le_bytes() == *check;
+        is_sound.then_some(record)
     }
-}
 
-fn check(content: &[u32; WORDS - 1]) -> u32 {
-    let mut digest = CRC.digest();
-    content
-        .iter()
-        .for_each(|word| digest.update(&word.to_le_bytes()));
-    digest.finalize()
+    /// The facts of a controller with these option bytes and checks of its board.
+    pub const fn facts(&self, option_bytes: u32, board_checks: u32) -> BoardFacts {
+        BoardFacts {
+            last_fault: self.fault.kind_and_step,
+            fault_address: self.fault.address,
+            fault_detail: self.fault.detail,
+            faults: self.faults,
+            option_bytes,
+            board_checks,
+        }
+    }
 }
 
 /// RAM for a record. A program puts it where the start-up code neither clears nor sets it:
@@ -242,7 +204,7 @@ fn check(content: &[u32; WORDS - 1]) -> u32 {
 /// # assert_eq!(RETAINED.read().map(|record| record.faults), Some(1));
 /// ```
 #[derive(Debug)]
-pub struct RetainedRam([AtomicU32; WORDS]);
+pub struct RetainedRam([AtomicU8; BYTES]);
 
 impl Default for RetainedRam {
     fn default() -> Self {
@@ -253,19 +215,18 @@ impl Default for RetainedRam {
 impl RetainedRam {
     /// RAM without a record.
     pub const fn new() -> Self {
-        Self([const { AtomicU32::new(0) }; WORDS])
+        Self([const { AtomicU8::new(0) }; BYTES])
     }
 
     /// The record, if its check is right.
     pub fn read(&self) -> Option<Retained> {
-        let words = core::array::from_fn(|k| self.0.get(k).map_or(0, |word| word.load(Relaxed)));
-        Retained::from_words(&words)
+        Retained::from_bytes(&self.0.each_ref().map(|byte| byte.load(Relaxed)))
     }
 
     /// Replaces the record.
     pub fn write(&self, record: &Retained) {
-        for (to, word) in self.0.iter().zip(record.to_words()) {
-            to.store(word, Relaxed);
+        for (to, byte) in self.0.iter().zip(record.to_bytes()) {
+            to.store(byte, Relaxed);
         }
     }
 
@@ -308,16 +269,32 @@ mod tests {
     #[test]
     fn a_record_reads_back_and_no_changed_bit_is_accepted() {
         let record = record();
-        let words = record.to_words();
-        assert_eq!(Retained::from_words(&words), Some(record));
-        for bit in 0..32 * WORDS {
-            let mut changed = words;
-            changed[bit / 32] ^= 1 << (bit % 32);
-            assert_eq!(Retained::from_words(&changed), None, "bit {bit}");
+        let bytes = record.to_bytes();
+        assert_eq!(Retained::from_bytes(&bytes), Some(record));
+        for bit in 0..8 * BYTES {
+            let mut changed = bytes;
+            changed[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(Retained::from_bytes(&changed), None, "bit {bit}");
         }
-        for random in [[0; WORDS], [u32::MAX; WORDS], [0xa5a5_a5a5; WORDS]] {
-            assert_eq!(Retained::from_words(&random), None);
+        for random in [[0; BYTES], [0xff; BYTES], [0xa5; BYTES]] {
+            assert_eq!(Retained::from_bytes(&random), None);
         }
+    }
+
+    #[test]
+    fn the_longest_record_fits() {
+        let longest = Retained {
+            fault: Fault {
+                kind_and_step: u32::MAX,
+                address: u32::MAX,
+                detail: u32::MAX,
+            },
+            faults: u32::MAX,
+            early_faults: u8::MAX,
+            running: u32::MAX,
+            ..record()
+        };
+        assert_eq!(Retained::from_bytes(&longest.to_bytes()), Some(longest));
     }
 
     #[test]

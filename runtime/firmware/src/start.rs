@@ -74,14 +74,7 @@ pub fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFact
         board_check::BROWN_OUT_LOW,
         option_bytes & BROWN_OUT_LEVEL != 0,
     );
-    let facts = BoardFacts {
-        last_fault: before.record.fault.kind_and_step,
-        fault_address: before.record.fault.address,
-        fault_detail: before.record.fault.detail,
-        faults: before.record.faults,
-        option_bytes,
-        board_checks: checks | low,
-    };
+    let facts = before.record.facts(option_bytes, checks | low);
     crate::log::start(&facts);
     facts
 }

@@ -27,19 +27,17 @@ const REASON_BOTH_ERASED: u8 = 2;
 /// Reason of [`NodeState::SelfTestFailed`].
 const REASON_FPU: u8 = 1;
 
-/// A fault of the converter in one byte, and whether it gave no codes at all.
+/// A fault of the converter: the state and the reason of its tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SampleFault {
-    reason: u8,
-    silent: bool,
-}
+pub struct SampleFault(NodeState, u8);
 
-impl<B> From<&AdcError<B>> for SampleFault {
-    fn from(error: &AdcError<B>) -> Self {
-        Self {
-            reason: error.number(),
-            silent: matches!(error, AdcError::Silent { .. } | AdcError::NotReady { .. }),
-        }
+impl<B> From<AdcError<B>> for SampleFault {
+    fn from(error: AdcError<B>) -> Self {
+        let state = match error {
+            AdcError::Silent { .. } | AdcError::NotReady { .. } => NodeState::NoFrames,
+            _ => NodeState::SensorFault,
+        };
+        Self(state, error.number())
     }
 }
 
@@ -88,8 +86,7 @@ impl Parameters {
             _ if self.state.0 == NodeState::SelfTestFailed => self.state,
             _ if is_updating => (NodeState::Updating, 0),
             _ if self.servo.is_none() => self.state,
-            Err(fault) if fault.silent => (NodeState::NoFrames, fault.reason),
-            Err(fault) => (NodeState::SensorFault, fault.reason),
+            Err(SampleFault(state, reason)) => (*state, *reason),
             Ok(_) if bad_codes != 0 => {
                 let channel = bad_codes.trailing_zeros() as u8;
                 (NodeState::SensorFault, REASON_CHANNEL + channel)

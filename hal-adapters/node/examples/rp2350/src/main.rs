@@ -29,7 +29,7 @@ use embassy_rp::trng::{InterruptHandler, Trng};
 use embassy_rp::watchdog::{ResetReason, Watchdog};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use hal_adapters::adc::{Ads8688, Channels};
-use hal_adapters::can::status::BoardFacts;
+use hal_adapters::can::status::board_check;
 use hal_adapters::can::update::Identity;
 use runtime::zero_offset::ZeroOffsetSettings;
 use stage_node::controller::{Controller, Parts};
@@ -97,7 +97,8 @@ fn main() -> ! {
         period: const { Period::from_us(2000).expect("a period") },
         rezero_limits: ZeroOffsetSettings::default(),
     };
-    let mut controller = Controller::start(parts, settings, &before, BoardFacts::default());
+    let facts = before.record.facts(0, board_check::NO_KEY);
+    let mut controller = Controller::start(parts, settings, &before, facts);
     loop {
         while !is_past(controller.due_us()) {
             controller.mailbox_empty();
