@@ -80,8 +80,8 @@ impl Node {
         self.controller.can().received.extend(received);
         let now_us = self.controller.due_us().wrapping_add(late_us);
         self.controller.board.now_us = now_us;
-        self.controller.trigger();
-        self.controller.finish();
+        self.controller.turn();
+        self.controller.turn();
         core::mem::take(&mut self.controller.board.erases)
     }
 

@@ -64,16 +64,11 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         before: &Before,
         facts: BoardFacts,
     ) -> Self {
-        let Parts {
-            converter,
-            can,
-            slots,
-            mut board,
-        } = parts;
-        let period = settings.period;
+        let (mut board, period) = (parts.board, settings.period);
         board.feed_watchdog();
         board.record().begin(Step::Parameters);
-        let (mut records, refusal) = Records::start(slots, before.choice, settings.identity.serial);
+        let (mut records, refusal) =
+            Records::start(parts.slots, before.choice, settings.identity.serial);
         // After a warm start the FPU may have any settings. These give the host's arithmetic.
         fpu::restore();
         let is_sound = runtime::arithmetic::check().is_ok() && fpu::defaults_are_sound();
@@ -101,7 +96,7 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
 
         board.feed_watchdog();
         board.record().begin(Step::Converter);
-        let mut acquisition = Acquisition::new(converter, period);
+        let mut acquisition = Acquisition::new(parts.converter, period);
         // The ticks report a failure and start it again.
         let _ = acquisition.start();
 
@@ -110,7 +105,7 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         board.record().begin(Step::Ticking);
         Self {
             board,
-            bus: Bus::new(can, period),
+            bus: Bus::new(parts.can, period),
             schedule,
             open: None,
             acquisition,
@@ -131,22 +126,20 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         self.schedule.due_us()
     }
 
-    /// A tick is due: triggers the converter. Returns when [`Controller::finish`] is due, us of the clock.
-    pub fn trigger(&mut self) -> u32 {
+    /// The next half of a tick: triggers the converter, or, once its codes have settled, does the rest. Returns when the
+    /// next half is due, us of the clock.
+    pub fn turn(&mut self) -> u32 {
+        if let Some(tick) = self.open.take() {
+            self.finish(tick);
+            return self.due_us();
+        }
         let tick = self.schedule.start_tick(self.board.now_us());
         self.acquisition.trigger();
-        // A tick that is still open is abandoned: it never feeds the watchdog.
-        if self.open.replace(tick).is_some() {
-            self.overrun_ticks = self.overrun_ticks.saturating_add(1);
-        }
+        self.open = Some(tick);
         tick.started_us.wrapping_add(A::SETTLE_US)
     }
 
-    /// The codes have settled: the rest of the tick.
-    pub fn finish(&mut self) {
-        let Some(tick) = self.open.take() else {
-            return;
-        };
+    fn finish(&mut self, tick: Tick) {
         let sample = self.acquisition.sample(tick.sequence);
         self.bus.start_tick();
         // Its announcement has left, or nobody listens.

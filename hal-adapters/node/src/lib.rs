@@ -27,7 +27,7 @@
 //! A program sets up clocks, pins and peripherals, and hands [`controller::Controller::start`] four things: a converter
 //! ([`hal_adapters::adc::FrameSampler`]), a CAN controller ([`bus::Can`]), flash that may be programmed twice
 //! ([`embedded_storage::nor_flash::MultiwriteNorFlash`]), and a [`board::Board`]. Then it calls
-//! [`controller::Controller::trigger`] and [`controller::Controller::finish`] on time. `runtime/firmware` does so for
+//! [`controller::Controller::turn`] on time. `runtime/firmware` does so for
 //! the STM32F405, and `examples/rp2350` beside this crate for the RP2350.
 #![no_std]
 #![deny(unsafe_code)]

@@ -34,10 +34,9 @@ mod watchdog;
 mod app {
     use super::board::{self, Converter};
     use super::fault::{self, RETAINED};
-    use super::timer::{Clock, SETTLED, TICK};
+    use super::timer::Clock;
     use super::{bus::BxCan, chip::Chip, flash, random::Random, seal, start, supply};
     use super::{wait::Stopwatch, watchdog::Watchdog};
-    use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::status::{bit, board_check};
     use stage_node::controller::{Controller, Parts};
     use stage_node::retained::Step;
@@ -96,7 +95,7 @@ mod app {
         };
         let facts = start::board_facts(&before, options, checks);
         let controller = Controller::start(parts, board::settings(), &before, facts);
-        clock.set_alarm::<TICK>(controller.due_us());
+        clock.set_alarm(controller.due_us());
         (Shared { controller }, Local { clock })
     }
 
@@ -107,22 +106,12 @@ mod app {
         }
     }
 
-    /// A tick: the trigger, and, once the codes have settled, the rest.
+    /// Half of a tick: the trigger, or, once the codes have settled, the rest.
     #[task(binds = TIM2, priority = 1, local = [clock], shared = [controller])]
     fn tick(cx: tick::Context) {
-        let (clock, controller) = (cx.local.clock, cx.shared.controller);
-        let alarms = clock.take_alarms();
-        if alarms.tick {
-            let settled_us = controller.trigger();
-            clock.set_alarm::<TICK>(controller.due_us());
-            if Converter::SETTLE_US > 0 {
-                clock.set_alarm::<SETTLED>(settled_us);
-                return;
-            }
-        } else if !alarms.settled {
-            return;
-        }
-        controller.finish();
+        cx.local.clock.silence();
+        let due_us = cx.shared.controller.turn();
+        cx.local.clock.set_alarm(due_us);
     }
 
     /// A mailbox has become empty: the next frame.

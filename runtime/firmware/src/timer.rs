@@ -1,4 +1,4 @@
-//! TIM2 as a clock in us that never stops, with two alarms. Its 32 bits wrap after 71
+//! TIM2 as a clock in us that never stops, with an alarm. Its 32 bits wrap after 71
 //! minutes, like the time of a frame. Its third channel notes when the converter's data-ready line falls.
 
 use crate::board;
@@ -6,23 +6,9 @@ use hal_adapters::adc::DataReady;
 use stm32f4xx_hal::pac::TIM2;
 use stm32f4xx_hal::pac::tim2::RegisterBlock;
 
-/// The alarm of ticks.
-pub const TICK: u8 = 0;
-/// The alarm when the converter has settled.
-pub const SETTLED: u8 = 1;
-
 /// The clock.
 pub struct Clock {
     timer: TIM2,
-}
-
-/// Which alarms went off.
-#[derive(Clone, Copy)]
-pub struct Alarms {
-    /// A tick is due.
-    pub tick: bool,
-    /// The converter has settled.
-    pub settled: bool,
 }
 
 impl Clock {
@@ -46,32 +32,21 @@ impl Clock {
         ReadyLine { seen_us: 0 }
     }
 
-    /// Sets off alarm `N`, [`TICK`] or [`SETTLED`], at `due_us`; at once, if that is past.
-    pub fn set_alarm<const N: u8>(&mut self, due_us: u32) {
-        self.timer.ccr(N.into()).write(|w| w.ccr().set(due_us));
-        // A match with the register's earlier value is no alarm. Writing 1 does not change a flag.
-        self.timer
-            .sr()
-            .write(|w| w.cc1if().bit(N != TICK).cc2if().bit(N != SETTLED));
-        self.timer.dier().modify(|_, w| w.ccie(N).set_bit());
+    /// Sets the alarm off at `due_us`; at once, if that is past.
+    pub fn set_alarm(&mut self, due_us: u32) {
+        self.timer.ccr(0).write(|w| w.ccr().set(due_us));
+        // A match with the register's earlier value is no alarm.
+        self.silence();
+        self.timer.dier().write(|w| w.cc1ie().set_bit());
         if now_us().wrapping_sub(due_us) < u32::MAX / 2 {
-            self.timer.egr().write(|w| w.ccg(N).set_bit());
+            self.timer.egr().write(|w| w.cc1g().set_bit());
         }
     }
 
-    /// The alarms that went off and were armed; they are silenced.
-    pub fn take_alarms(&mut self) -> Alarms {
-        let (flags, armed) = (self.timer.sr().read(), self.timer.dier().read());
-        let tick = flags.cc1if().bit_is_set() && armed.cc1ie().bit_is_set();
-        let settled = flags.cc2if().bit_is_set() && armed.cc2ie().bit_is_set();
-        // Writing 1 does not change a flag.
-        self.timer
-            .sr()
-            .write(|w| w.cc1if().bit(!tick).cc2if().bit(!settled));
-        if settled {
-            self.timer.dier().modify(|_, w| w.cc2ie().clear_bit());
-        }
-        Alarms { tick, settled }
+    /// Ends the alarm.
+    pub fn silence(&mut self) {
+        // Writing 1 does not change a flag; the flags of other channels are not used.
+        self.timer.sr().write(|w| w.cc1if().clear_bit());
     }
 }
 

@@ -10,9 +10,10 @@ use registers::{LATCH_OFF, RECOVER, TXRQ};
 use std::collections::VecDeque;
 
 /// State of the bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BusState {
     /// Others listen and acknowledge.
+    #[default]
     Good,
     /// No other node: frames are repeated without end.
     Alone,
@@ -52,12 +53,13 @@ struct Mailbox {
 }
 
 /// The controller.
+#[derive(Default)]
 pub struct CanModel {
     mcr: u32,
     /// When it takes part in the bus, once it was asked to.
     joins_ns: Option<u64>,
-    /// Whether it ever acknowledges that it stands still.
-    pub acknowledges: bool,
+    /// Whether it never acknowledges that it stands still.
+    pub is_dead: bool,
     /// Whether the receive line is held low: the eleven recessive bits that the controller joins
     /// the bus after never come (RM0090 32.4.1).
     pub held_low: bool,
@@ -87,36 +89,24 @@ pub struct CanModel {
     pub sent: Vec<Sent>,
     /// Mailboxes filled since start.
     pub filled: u64,
-    plain: [u32; 256],
+    plain: Vec<u32>,
 }
 
 impl CanModel {
-    /// A controller after reset.
-    pub fn new() -> Self {
-        let mut plain = [0; 256];
-        plain[0x200 / 4] = 0x2a1c_0e01;
-        Self {
+    /// Resets the controller, as every power-on does. The bus stays.
+    pub fn reset(&mut self, now_ns: u64) {
+        let bus = self.bus;
+        *self = Self {
             mcr: 0x0001_0002,
-            joins_ns: None,
-            acknowledges: true,
-            held_low: false,
-            interrupts: 0,
-            latched: false,
-            advanced_ns: 0,
-            busy_until_ns: 0,
-            others_send: None,
-            off_until: None,
-            mailboxes: [Mailbox::default(); 3],
-            done: 0,
-            on_the_wire: None,
-            received: VecDeque::new(),
-            overrun: false,
-            bus: BusState::Good,
-            node: NodeNumber::TABLE,
-            sent: Vec::new(),
-            filled: 0,
-            plain,
-        }
+            plain: vec![0; 256],
+            is_dead: self.is_dead,
+            node: self.node,
+            sent: std::mem::take(&mut self.sent),
+            filled: self.filled,
+            ..Self::default()
+        };
+        self.plain[0x200 / 4] = 0x2a1c_0e01;
+        self.set_bus(bus, now_ns);
     }
 
     /// Changes what the bus does from `now_ns` on. What is on the wire is destroyed.

@@ -41,9 +41,8 @@ pub struct Clocks {
     timer: (u32, u32, u64),
 }
 
-impl Clocks {
-    /// As after a reset, with this crystal and PLL.
-    pub const fn new(crystal: bool, pll: Pll) -> Self {
+impl Default for Clocks {
+    fn default() -> Self {
         Self {
             cr: 0x83,
             pllcfgr: 0x2400_3010,
@@ -52,10 +51,22 @@ impl Clocks {
             hse_since: 0,
             pll_since: 0,
             crystal_start_ns: 2_000_000,
-            crystal,
-            pll,
+            crystal: true,
+            pll: Pll::Sound,
             timer: (0, 0, 0),
         }
+    }
+}
+
+impl Clocks {
+    /// Resets the registers.
+    pub fn reset(&mut self) {
+        let Self { crystal, pll, .. } = *self;
+        *self = Self {
+            crystal,
+            pll,
+            ..Self::default()
+        };
     }
 
     fn hse_ready(&self, now_ns: u64) -> bool {

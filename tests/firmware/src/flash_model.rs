@@ -60,9 +60,8 @@ pub struct FlashModel {
     busy_until_ns: u64,
 }
 
-impl FlashModel {
-    /// Erased sectors.
-    pub fn new() -> Self {
+impl Default for FlashModel {
+    fn default() -> Self {
         Self {
             sectors: Sectors::erased(),
             erases: 0,
@@ -74,7 +73,9 @@ impl FlashModel {
             busy_until_ns: 0,
         }
     }
+}
 
+impl FlashModel {
     /// Cuts the power, one time after the other.
     pub fn cut_at(&mut self, cuts: &[PowerCut]) {
         self.cuts = cuts.iter().copied().collect();

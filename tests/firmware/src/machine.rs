@@ -9,7 +9,7 @@ use crate::callbacks::{Context, count, inject, read, write};
 use crate::can_model::BusState;
 use crate::flash_model::{BYTES, FIRST};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
-use crate::memory::{Memory, memory};
+use crate::memory::Memory;
 use crate::peripherals::{IRQ_TIM2, Peripherals, WINDOWS, cause};
 use crate::unicorn::{Unicorn, register};
 use std::ffi::{OsStr, c_void};
@@ -65,9 +65,9 @@ impl Machine {
     /// A chip with the program and two parameter slots in flash, before its first instruction.
     pub fn new(library: &OsStr, image: &Image, rows: Vec<Row>, slots: [&[u8]; 2]) -> Self {
         let core = Unicorn::open(library);
-        let mut flash = memory::<FLASH_BYTES>(0xff);
+        let mut flash = Box::<Memory<FLASH_BYTES>>::default();
         flash.0.copy_from_slice(&image.flash);
-        let mut returns = memory::<4096>(0);
+        let mut returns = Box::<Memory<4096>>::default();
         let mut chip = Box::new(Peripherals::new(rows));
         chip.ram.0[..image.stack_bytes].fill(PAINT);
         fill_with_noise(&mut chip.ram.0[image.stack_bytes..]);

@@ -5,11 +5,11 @@ mod registers;
 
 use crate::adc_model::{Adc, Input, Row};
 use crate::can_model::CanModel;
-use crate::clock_model::{Clocks, Pll};
+use crate::clock_model::Clocks;
 use crate::dma_model::{Dma, Request, Side};
 use crate::flash_model::{BYTES, FIRST, FlashModel};
 use crate::image::RAM_BYTES;
-use crate::memory::{Memory, memory};
+use crate::memory::Memory;
 use crate::random_model::RandomModel;
 use crate::watchdog_model::Watchdog;
 use registers::{MPU_CTRL, MPU_RASR, MPU_RBAR, TIM2};
@@ -54,13 +54,8 @@ pub mod cause {
     pub const WATCHDOG: u32 = 1 << 29 | PIN;
 }
 
-/// One of the two alarms of the timer.
-#[derive(Clone, Copy, Default)]
-struct Alarm {
-    at_ns: Option<u64>,
-}
-
 /// All of them.
+#[derive(Default)]
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
@@ -72,7 +67,7 @@ pub struct Peripherals {
     pub adc: Adc,
     /// RAM, which DMA reaches.
     pub ram: Box<Memory<RAM_BYTES>>,
-    /// By how much the second alarm comes late, ns.
+    /// By how much the alarm after a trigger comes late, ns.
     pub settled_jitter_ns: i64,
     /// Whether DMA takes no byte that comes over the SPI.
     pub dma_stands: bool,
@@ -119,11 +114,14 @@ pub struct Peripherals {
     words: Vec<u32>,
     core_words: Vec<u32>,
     reset_flags: u32,
-    alarms: [Alarm; 2],
+    alarm_ns: Option<u64>,
     timer_flags: u32,
     timer_started_ns: Option<u64>,
-    /// Whether no tick has come since the reset.
-    starts: bool,
+    /// Whether the converter was triggered since the alarm was set, and whether it had been before.
+    triggered: bool,
+    alarm_settles: bool,
+    /// Whether a tick has come since the reset.
+    ticked: bool,
     /// What the timer read when DRDY fell, us.
     captured_us: u32,
     dma: Dma,
@@ -146,46 +144,11 @@ impl Peripherals {
     pub fn new(rows: Vec<Row>) -> Self {
         let mut new = Self {
             now_ns: BOOT_NS,
-            spi_byte_ns: None,
-            spi_bytes: 0,
             adc: Adc::new(Input::held(rows)),
-            ram: memory(0),
-            settled_jitter_ns: 0,
-            dma_stands: false,
-            can: CanModel::new(),
-            timer_offset_us: 0,
-            first_tick_ns: None,
-            watchdog: Watchdog::new(),
-            clocks: Clocks::new(true, Pll::Sound),
-            flash: FlashModel::new(),
-            random: RandomModel::new(),
             // As delivered, but with the highest brown-out level.
             option_bytes: 0x0fff_aae1,
-            supply_low_until_ns: 0,
-            supply_drops_at: None,
             pulled_up: [true; 2],
-            servo_on: false,
-            memory_fault: false,
-            reset_asked: false,
-            inject: Vec::new(),
-            injects_again: false,
-            instructions: 0,
-            instructions_timed: 0,
-            instructions_at_mailbox: 0,
-            led: false,
-            words: Vec::new(),
-            core_words: Vec::new(),
-            reset_flags: 0,
-            alarms: [Alarm::default(); 2],
-            timer_flags: 0,
-            timer_started_ns: None,
-            starts: true,
-            captured_us: 0,
-            dma: Dma::default(),
-            transfer: None,
-            overrun: false,
-            data_read: false,
-            selected: false,
+            ..Self::default()
         };
         new.reset(cause::POWER_ON);
         new
@@ -196,29 +159,17 @@ impl Peripherals {
         self.words = vec![0; RANGE.1 as usize / 4];
         self.core_words = vec![0; CORE.1 as usize / 4];
         self.core_words[0xef34 / 4] = 0xc000_0000; // FPCCR: ASPEN, LSPEN
-        self.clocks = Clocks::new(self.clocks.crystal, self.clocks.pll);
+        self.clocks.reset();
         self.reset_asked = false;
         self.flash.reset();
         self.random.on = false;
         self.reset_flags |= flags;
-        self.alarms = [Alarm::default(); 2];
-        self.timer_flags = 0;
+        (self.alarm_ns, self.timer_flags) = (None, 0);
         (self.timer_started_ns, self.captured_us) = (None, 0);
-        self.starts = true;
-        self.dma = Dma::default();
-        self.transfer = None;
-        self.overrun = false;
-        let fed = self.watchdog.fed;
-        self.watchdog = Watchdog::new();
-        self.watchdog.fed = fed;
-        let acknowledges = self.can.acknowledges;
-        let bus = self.can.bus;
-        let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
-        let node = self.can.node;
-        self.can = CanModel::new();
-        (self.can.sent, self.can.filled, self.can.node) = (sent, filled, node);
-        self.can.acknowledges = acknowledges;
-        self.can.set_bus(bus, self.now_ns);
+        (self.triggered, self.alarm_settles, self.ticked) = (false, false, false);
+        (self.dma, self.transfer, self.overrun) = (Dma::default(), None, false);
+        self.watchdog.reset();
+        self.can.reset(self.now_ns);
     }
 
     /// Whether the supply is below 2.9 V.
@@ -241,25 +192,23 @@ impl Peripherals {
 
     /// Time of the next event, ns.
     pub fn next_event_ns(&self) -> Option<u64> {
-        let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
-        alarms
-            .chain(self.can.next_event_ns())
-            .chain(self.watchdog.bites_ns())
-            .min()
+        let events = [
+            self.alarm_ns,
+            self.can.next_event_ns(),
+            self.watchdog.bites_ns(),
+        ];
+        events.into_iter().flatten().min()
     }
 
     /// Does what is due by now.
     pub fn advance(&mut self) {
         let now_ns = self.now_ns;
-        for (k, alarm) in self.alarms.iter_mut().enumerate() {
-            if let Some(at) = alarm.at_ns.filter(|at| *at <= now_ns) {
-                alarm.at_ns = None;
-                self.timer_flags |= 2 << k;
-                if k == 0 {
-                    self.first_tick_ns.get_or_insert(at);
-                    if std::mem::take(&mut self.starts) {
-                        self.adc.input.join(at);
-                    }
+        if let Some(at) = self.alarm_ns.take_if(|at| *at <= now_ns) {
+            self.timer_flags |= 2;
+            if !self.alarm_settles {
+                self.first_tick_ns.get_or_insert(at);
+                if !std::mem::replace(&mut self.ticked, true) {
+                    self.adc.input.join(at);
                 }
             }
         }
@@ -305,9 +254,9 @@ impl Peripherals {
         }
     }
 
-    /// Whether the alarm of ticks, the first alarm, is pending.
+    /// Whether the alarm of a tick is pending.
     pub fn tick_is_due(&self) -> bool {
-        self.timer_flags & 2 != 0
+        self.timer_flags & 2 != 0 && !self.alarm_settles
     }
 
     /// The interrupt that is taken next.
@@ -317,7 +266,7 @@ impl Peripherals {
         let armed = self.words[(TIM2 + 0x0c) / 4];
         if self.can.transmit_interrupt() && enabled(IRQ_CAN1_TX) {
             Some(IRQ_CAN1_TX)
-        } else if self.timer_flags & armed & 6 != 0 && enabled(IRQ_TIM2) {
+        } else if self.timer_flags & armed & 2 != 0 && enabled(IRQ_TIM2) {
             Some(IRQ_TIM2)
         } else {
             None

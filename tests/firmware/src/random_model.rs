@@ -7,6 +7,7 @@ const READY: u32 = 1;
 const SEED: u32 = 1 << 6 | 1 << 2;
 
 /// The generator.
+#[derive(Default)]
 pub struct RandomModel {
     /// Whether it is switched on.
     pub on: bool,
@@ -17,16 +18,6 @@ pub struct RandomModel {
 }
 
 impl RandomModel {
-    /// A sound one.
-    pub const fn new() -> Self {
-        Self {
-            on: false,
-            broken: false,
-            words: Words(2),
-            latched: false,
-        }
-    }
-
     /// A register.
     pub fn read(&mut self, offset: usize) -> u32 {
         match offset {

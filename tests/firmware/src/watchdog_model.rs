@@ -14,26 +14,34 @@ pub struct Watchdog {
     unlocked: bool,
     divider: u64,
     reload: u64,
-    new_divider: Option<(u64, u64)>,
-    new_reload: Option<(u64, u64)>,
+    /// Written values, and when they are taken over: divider and reload.
+    new: [Option<(u64, u64)>; 2],
     /// The count at a time, once it runs.
     count: Option<(u64, u64)>,
     /// How often it was fed.
     pub fed: u64,
 }
 
-impl Watchdog {
-    /// As after a reset.
-    pub const fn new() -> Self {
+impl Default for Watchdog {
+    fn default() -> Self {
         Self {
             unlocked: false,
             divider: 4,
             reload: 0xfff,
-            new_divider: None,
-            new_reload: None,
+            new: [None; 2],
             count: None,
             fed: 0,
         }
+    }
+}
+
+impl Watchdog {
+    /// Stops and resets the registers.
+    pub fn reset(&mut self) {
+        *self = Self {
+            fed: self.fed,
+            ..Self::default()
+        };
     }
 
     fn period_ns(&self) -> u64 {
@@ -46,32 +54,27 @@ impl Watchdog {
         Some(at_ns + (count + 1) * self.period_ns())
     }
 
-    /// Takes over what was written.
+    /// Takes over what was written. Without the oscillator nothing is taken over.
     pub fn advance(&mut self, now_ns: u64) {
-        if self.count.is_none() {
+        let Some((count, since)) = self.count else {
             return;
-        }
-        if let Some((divider, at)) = self.new_divider.filter(|(_, at)| *at <= now_ns) {
-            if let Some((count, since)) = self.count {
-                let passed = (at - since) / self.period_ns();
-                self.count = Some((count.saturating_sub(passed), at));
-            }
+        };
+        let is_due = |new: &mut (u64, u64)| new.1 <= now_ns;
+        if let Some((divider, at)) = self.new[0].take_if(is_due) {
+            let passed = (at - since) / self.period_ns();
+            self.count = Some((count.saturating_sub(passed), at));
             self.divider = divider;
-            self.new_divider = None;
         }
-        if let Some((reload, _)) = self.new_reload.filter(|(_, at)| *at <= now_ns) {
+        if let Some((reload, _)) = self.new[1].take_if(is_due) {
             self.reload = reload;
-            self.new_reload = None;
         }
     }
 
     /// A register.
     pub fn read(&mut self, offset: usize, now_ns: u64) -> u32 {
         self.advance(now_ns);
-        match offset {
-            0x0c => {
-                u32::from(self.new_divider.is_some()) | u32::from(self.new_reload.is_some()) << 1
-            }
+        match (offset, self.new.map(|new| u32::from(new.is_some()))) {
+            (0x0c, [divider, reload]) => divider | reload << 1,
             _ => 0,
         }
     }
@@ -80,7 +83,6 @@ impl Watchdog {
     pub fn write(&mut self, offset: usize, value: u32, now_ns: u64) {
         self.advance(now_ns);
         let value = u64::from(value);
-        // Without the oscillator nothing is taken over.
         let taken_over = now_ns + UPDATE_PERIODS * S / LSI_HZ;
         match offset {
             0x00 => {
@@ -94,8 +96,8 @@ impl Watchdog {
                     _ => {}
                 }
             }
-            0x04 if self.unlocked => self.new_divider = Some((4 << (value & 7).min(6), taken_over)),
-            0x08 if self.unlocked => self.new_reload = Some((value & 0xfff, taken_over)),
+            0x04 if self.unlocked => self.new[0] = Some((4 << (value & 7).min(6), taken_over)),
+            0x08 if self.unlocked => self.new[1] = Some((value & 0xfff, taken_over)),
             _ => {}
         }
     }
@@ -103,10 +105,9 @@ impl Watchdog {
     fn start(&mut self, now_ns: u64) {
         let after = now_ns + UPDATE_PERIODS * S / LSI_HZ;
         self.count = Some(self.count.unwrap_or((0xfff, now_ns)));
-        self.new_divider = self
-            .new_divider
-            .map(|(divider, at)| (divider, at.max(after)));
-        self.new_reload = self.new_reload.map(|(reload, at)| (reload, at.max(after)));
+        for (_, at) in self.new.iter_mut().flatten() {
+            *at = after.max(*at);
+        }
     }
 }
 
@@ -118,7 +119,7 @@ mod tests {
 
     #[test]
     fn the_first_period_is_512_ms_and_the_written_one_counts_once_it_is_fed() {
-        let mut watchdog = Watchdog::new();
+        let mut watchdog = Watchdog::default();
         watchdog.write(0, 0xcccc, 0);
         assert_eq!(watchdog.bites_ns(), Some(512 * MS));
         watchdog.write(0, 0x5555, 0);

@@ -41,7 +41,7 @@ impl Cut {
 }
 
 /// Random words by a seed (SplitMix64, Steele et al. 2014).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Words(
     /// The seed.
     pub u64,

@@ -5,7 +5,7 @@
 //! another conversion is stored, it falls once more at once (figure 8-21).
 //!
 //! Not modelled: word lengths other than 24 bits, oversampling above 1024, phases, gains, offsets,
-//! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
+//! global chop, the fast-settling filter of the first two conversions after a reset, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
 mod frames;
@@ -28,19 +28,19 @@ const RESET_CLKIN: u64 = 2048;
 
 const CLOCK: usize = 0x03;
 
-/// The part.
+/// The part. It works from its first supply on.
+#[derive(Default)]
 pub struct Ads131m08 {
     /// The behaviour where the sheet is silent.
     pub variant: Variant,
-    registers: [u16; 64],
+    registers: Vec<u16>,
     ready_ns: u64,
     low_since_ns: Option<u64>,
-    clocked: bool,
-    /// Since when the filters take data, how many conversions ended since, and whether the first
-    /// two come from the fast-settling filter.
+    /// Whether CLKIN stands.
+    stands: bool,
+    /// Since when the filters take data, and how many conversions ended since.
     from_ns: u64,
     conversions: u64,
-    fast: bool,
     store: VecDeque<Conversion>,
     shown: Option<Conversion>,
     codes: Row,
@@ -58,36 +58,6 @@ pub struct Ads131m08 {
     reply: Vec<u8>,
 }
 
-impl Default for Ads131m08 {
-    fn default() -> Self {
-        let mut new = Self {
-            variant: Variant::ALL[0],
-            registers: [0; 64],
-            ready_ns: POWER_ON_NS,
-            low_since_ns: None,
-            clocked: true,
-            from_ns: 0,
-            conversions: 0,
-            fast: true,
-            store: VecDeque::new(),
-            shown: None,
-            codes: [0; 6],
-            fell_ns: None,
-            is_selected: false,
-            resynchronised: false,
-            map_flag: false,
-            map_crc: 0,
-            map_changed_ns: None,
-            response: None,
-            listens: false,
-            received: Vec::new(),
-            reply: Vec::new(),
-        };
-        new.power_up(0);
-        new
-    }
-}
-
 impl Ads131m08 {
     /// The supply comes.
     pub fn power_up(&mut self, now_ns: u64) {
@@ -97,7 +67,7 @@ impl Ads131m08 {
     }
 
     fn reset(&mut self, now_ns: u64) {
-        self.registers = [0; 64];
+        self.registers = vec![0; 64];
         self.registers[..7].copy_from_slice(&[0x2804, 0x0500, 0x0510, 0xff0e, 0, 0, 0x0600]);
         for channel in 0..8 {
             self.registers[0x0c + 5 * channel] = 0x8000;
@@ -106,13 +76,12 @@ impl Ads131m08 {
         self.map_flag = false;
         self.map_changed_ns = None;
         self.resynchronised = false;
-        self.restart(now_ns + INITIAL_WAIT * T_MOD_NS, true);
+        self.restart(now_ns + INITIAL_WAIT * T_MOD_NS);
     }
 
-    fn restart(&mut self, from_ns: u64, fast: bool) {
+    fn restart(&mut self, from_ns: u64) {
         self.from_ns = from_ns;
         self.conversions = 0;
-        self.fast = fast;
         self.store.clear();
     }
 
@@ -124,10 +93,10 @@ impl Ads131m08 {
 
     /// Whether CLKIN runs.
     pub fn set_clock(&mut self, runs: bool, now_ns: u64) {
-        if runs && !self.clocked {
-            self.restart(now_ns, false);
+        if runs && self.stands {
+            self.restart(now_ns);
         }
-        self.clocked = runs;
+        self.stands = !runs;
     }
 
     fn osr(&self) -> u64 {
@@ -154,15 +123,14 @@ impl Ads131m08 {
     fn advance(&mut self, now_ns: u64) {
         let since_ns = now_ns.saturating_sub(self.from_ns + self.variant.delay * T_MOD_NS);
         let ended = since_ns / (self.osr() * T_MOD_NS);
-        if self.clocked && self.store.len() == 2 && self.conversions >= 3 {
+        if !self.stands && self.store.len() == 2 && self.conversions >= 3 {
             // A full store keeps none of them.
             self.conversions = self.conversions.max(ended.saturating_sub(1));
         }
-        while self.clocked && self.next_ready_ns() <= now_ns {
+        while !self.stands && self.next_ready_ns() <= now_ns {
             let conversion = Conversion {
                 end_ns: self.next_end_ns(),
                 from_ns: self.from_ns,
-                fast: self.fast && self.conversions < 2,
                 osr: self.osr(),
             };
             if !self.is_selected {
@@ -186,14 +154,14 @@ impl Ads131m08 {
                 let aligned = now_ns >= clock_ns
                     && (now_ns - clock_ns) % period_ns < T_CLKIN_NS
                     && self.conversions > 0;
-                if self.clocked && !aligned {
-                    self.restart(now_ns + self.variant.wait * T_MOD_NS, false);
+                if !self.stands && !aligned {
+                    self.restart(now_ns + self.variant.wait * T_MOD_NS);
                     self.resynchronised = true;
                 }
             }
             Some(since) if high => {
                 self.low_since_ns = None;
-                if self.clocked && now_ns - since >= RESET_CLKIN * T_CLKIN_NS {
+                if !self.stands && now_ns - since >= RESET_CLKIN * T_CLKIN_NS {
                     self.reset(now_ns);
                     self.response = None;
                 }

@@ -17,6 +17,7 @@ fn running(variant: Variant) -> Ads131m08 {
         variant,
         ..Default::default()
     };
+    part.power_up(0);
     frame(&mut part, T_0 - 500_000, 0x6180, 0xff02);
     for _ in 0..3 {
         frame(&mut part, T_0 - 500_000, 0, 0);

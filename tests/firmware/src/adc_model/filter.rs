@@ -1,5 +1,4 @@
-//! The digital filters of the ADS131M08: sinc3, and for the first two conversions after a reset the
-//! fast-settling one.
+//! The digital filter of the ADS131M08: sinc3.
 
 use super::{Input, Row};
 use std::sync::OnceLock;
@@ -14,8 +13,6 @@ pub struct Conversion {
     pub end_ns: u64,
     /// The filter has no data from before, ns.
     pub from_ns: u64,
-    /// By the fast-settling filter.
-    pub fast: bool,
     /// Oversampling.
     pub osr: u64,
 }
@@ -48,15 +45,10 @@ impl Weights {
     }
 }
 
-/// The weights of a filter, made once: by oversampling 128 to 1024, sinc3 and fast-settling.
-fn weights(fast: bool, osr: u64) -> &'static Weights {
-    static ALL: [[OnceLock<Weights>; 4]; 2] = [const { [const { OnceLock::new() }; 4] }; 2];
-    ALL[usize::from(fast)][(osr / 128).ilog2() as usize].get_or_init(|| {
-        Weights::new(match fast {
-            true => vec![1.0 / osr as f64; osr as usize],
-            false => sinc3(osr),
-        })
-    })
+/// The weights by oversampling 128 to 1024, made once.
+fn weights(osr: u64) -> &'static Weights {
+    static ALL: [OnceLock<Weights>; 4] = [const { OnceLock::new() }; 4];
+    ALL[(osr / 128).ilog2() as usize].get_or_init(|| Weights::new(sinc3(osr)))
 }
 
 /// The codes of a conversion: the mean over the window of its filter, with zeros for samples
@@ -65,10 +57,9 @@ pub fn codes(conversion: Conversion, input: &Input) -> Row {
     let Conversion {
         end_ns,
         from_ns,
-        fast,
         osr,
     } = conversion;
-    let weights = weights(fast, osr);
+    let weights = weights(osr);
     let samples = weights
         .of
         .len()
@@ -102,7 +93,6 @@ mod tests {
         let conversion = Conversion {
             end_ns: 1_000_000,
             from_ns: 0,
-            fast: false,
             osr: 128,
         };
         let late_ns = 1_000_000 - codes(conversion, &input)[0];

@@ -7,6 +7,7 @@ pub type Row = [i32; 6];
 const PERIOD_NS: u64 = 2_000_000;
 
 /// The inputs.
+#[derive(Default)]
 pub struct Input {
     rows: Vec<Row>,
     period_ns: u64,
@@ -24,9 +25,7 @@ impl Input {
         Self {
             rows,
             period_ns: PERIOD_NS,
-            moves: false,
-            after_ns: 0,
-            start_ns: None,
+            ..Self::default()
         }
     }
 

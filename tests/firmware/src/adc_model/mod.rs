@@ -14,9 +14,10 @@ use thermometers::Thermometers;
 const RAIL: i32 = 0x7f_ffff;
 
 /// A fault of the converter or its wires.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AdcFault {
     /// No fault.
+    #[default]
     None,
     /// The data line always reads this byte.
     Line(u8),
@@ -39,6 +40,7 @@ pub enum AdcFault {
 }
 
 /// A converter.
+#[derive(Default)]
 pub struct Adc {
     /// The part.
     pub part: Ads131m08,
@@ -55,13 +57,12 @@ pub struct Adc {
 impl Adc {
     /// A converter that gets its supply at time 0.
     pub fn new(input: Input) -> Self {
-        Self {
-            part: Ads131m08::default(),
-            fault: AdcFault::None,
+        let mut new = Self {
             input,
-            thermometers: Thermometers::default(),
-            last: [0; 6],
-        }
+            ..Self::default()
+        };
+        new.part.power_up(0);
+        new
     }
 
     /// The level of SYNC/RESET.

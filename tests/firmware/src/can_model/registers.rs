@@ -60,7 +60,7 @@ impl CanModel {
 
     fn status(&self, now_ns: u64) -> u32 {
         let on = |bit, is| if is { bit } else { 0 };
-        let stands = self.acknowledges && self.mcr & SLEEP == 0;
+        let stands = !self.is_dead && self.mcr & SLEEP == 0;
         let stands = stands && self.joins_ns.is_none_or(|at| at > now_ns);
         0xc00
             | on(INIT_ACK, stands)
@@ -81,7 +81,7 @@ impl CanModel {
         match offset {
             0x00 => {
                 self.mcr = value;
-                let joins = self.acknowledges && !self.held_low && value & (INIT | SLEEP) == 0;
+                let joins = !self.is_dead && !self.held_low && value & (INIT | SLEEP) == 0;
                 self.joins_ns = joins.then(|| self.joins_ns.unwrap_or(now_ns + JOIN_NS));
                 self.arbitrate(now_ns);
             }

@@ -209,7 +209,7 @@ pub fn can_dead(bench: &Bench) {
     let faults: [(&str, Fault, &[u8]); 3] = [
         (
             "CAN does not start",
-            |m| m.chip.can.acknowledges = false,
+            |m| m.chip.can.is_dead = true,
             &bench.blob,
         ),
         (
@@ -263,13 +263,10 @@ pub fn crashes(bench: &Bench) {
     let stack = crate::image::RAM;
     let tick = image.range(TICK).expect(TICK);
     let panic = image.range("9panicking9panic_fmt").expect("a panic");
-    // The message is ignored. The place of the panic is any words of flash here.
+    // The message is ignored. The place of the panic is any words of flash here, in R1 or R2 as the linker likes.
     let place = image.address("_stext");
-    let into_panic = vec![
-        (register::R0, place),
-        (register::R0 + 1, place),
-        (register::PC, panic.start | 1),
-    ];
+    let mut into_panic = vec![(register::PC, panic.start | 1)];
+    into_panic.extend((0..3).map(|k| (register::R0 + k, place)));
     let line = Some(image.word(place + 8));
     let below = stack - 0x1000..stack;
     for (fault, inject, kind, addresses, wanted) in [

@@ -1,10 +1,12 @@
 //! Reads and writes of registers.
 
 use super::{
-    Alarm, BELOW_RAM, BIT_BAND, CORE, Dma, Peripherals, RANDOM, RANDOM_FIRST, RANGE, Request,
-    SECTORS, Transfer, US, WINDOWS,
+    BELOW_RAM, BIT_BAND, CORE, Dma, Peripherals, RANDOM, RANDOM_FIRST, RANGE, Request, SECTORS,
+    Transfer, US, WINDOWS,
 };
 
+/// The blocks of registers, from the start of the range, and the bytes that each takes.
+const BLOCK: usize = 0x400;
 pub(super) const TIM2: usize = 0x0_0000;
 const IWDG: usize = 0x0_3000;
 const CAN1: usize = 0x0_6400;
@@ -15,8 +17,6 @@ const GPIOB: usize = 0x2_0400;
 const GPIOC: usize = 0x2_0800;
 const RCC: usize = 0x2_3800;
 const FLASH: usize = 0x2_3c00;
-const OPTCR: usize = FLASH + 0x14;
-const AHB1RSTR: usize = RCC + 0x10;
 const AHB1ENR: usize = RCC + 0x30;
 const AHB2ENR: usize = RCC + 0x34;
 const DMA2: usize = 0x2_6400;
@@ -179,57 +179,55 @@ impl Peripherals {
     fn read(&mut self, offset: usize) -> u32 {
         self.pass_instructions();
         let word = self.words[offset / 4];
-        match offset {
-            o if (RCC..RCC + 0x10).contains(&o) => {
+        match (offset / BLOCK * BLOCK, offset % BLOCK) {
+            (RCC, at @ 0..0x10) => {
                 self.now_ns += POLL_NS;
-                self.clocks.read(o - RCC, self.now_ns)
+                self.clocks.read(at, self.now_ns)
             }
-            o if o == RCC + 0x70 => word | (word & 1) << 1,
-            o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
-            o if o == PWR + 4 => {
+            (RCC, 0x70) => word | (word & 1) << 1,
+            (RCC, 0x74) => word & 1 | (word & 1) << 1 | self.reset_flags,
+            (PWR, 4) => {
                 self.now_ns += POLL_NS;
                 1 << 14 | word | u32::from(self.detects_low_supply()) << 2
             }
-            o if o == OPTCR => self.option_bytes,
-            o if (FLASH + 4..OPTCR).contains(&o) => {
-                self.flash.read_register(o - FLASH, &mut self.now_ns)
-            }
-            o if o == GPIOA + 0x10 => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
-            o if o == GPIOB + 0x10 => {
+            (FLASH, at @ 4..0x14) => self.flash.read_register(at, &mut self.now_ns),
+            (FLASH, 0x14) => self.option_bytes,
+            (GPIOA, 0x10) => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
+            (GPIOB, 0x10) => {
                 self.level(GPIOB, SYNC_PIN, self.pulled_up[1])
                     | self.level(GPIOB, SERVO_PIN, false) & u32::from(self.servo_on) << SERVO_PIN
             }
-            o if o == TIM2 + 0x10 => {
+            (TIM2, 0x10) => {
                 self.advance();
                 self.timer_flags
             }
-            o if o == TIM2 + 0x24 => {
+            (TIM2, 0x24) => {
                 self.now_ns += LOOK_NS;
                 self.timer_us()
             }
-            o if o == TIM2 + 0x3c => self.capture(),
-            o if (DMA2..DMA2 + 0x400).contains(&o) => {
-                if o == DMA2 {
+            (TIM2, 0x3c) => self.capture(),
+            (DMA2, at) => {
+                if at == 0 {
                     self.end_transfer();
                 }
-                self.dma.read(o - DMA2)
+                self.dma.read(at)
             }
             // Transmit buffer empty, and an overrun: a read of DR and then of SR clears it, and until then nothing is
             // received (RM0090 rev. 18, section 28.3.10).
-            o if o == SPI1 + 0x08 => {
+            (SPI1, 0x08) => {
                 let state = 2 | u32::from(self.overrun) << 6;
                 self.overrun &= !self.data_read;
                 state
             }
-            o if o == SPI1 + 0x0c => {
+            (SPI1, 0x0c) => {
                 self.data_read = true;
                 word
             }
-            o if (CAN1..CAN1 + 0x400).contains(&o) => {
+            (CAN1, at) => {
                 self.can.advance(self.now_ns);
-                self.can.read(o - CAN1, self.now_ns)
+                self.can.read(at, self.now_ns)
             }
-            o if (IWDG..IWDG + 0x10).contains(&o) => self.watchdog.read(o - IWDG, self.now_ns),
+            (IWDG, at) => self.watchdog.read(at, self.now_ns),
             _ => word,
         }
     }
@@ -238,48 +236,38 @@ impl Peripherals {
     fn write(&mut self, offset: usize, value: u32) {
         self.pass_instructions();
         self.words[offset / 4] = value;
-        match offset {
-            o if o == RCC + 0x74 && value & 1 << 24 != 0 => self.reset_flags = 0,
-            o if o == TIM2 && value & 1 != 0 && self.timer_started_ns.is_none() => {
+        match (offset / BLOCK * BLOCK, offset % BLOCK) {
+            (RCC, at @ 0..0x10) => self.clocks.write(at, value, self.now_ns),
+            (RCC, 0x10) if value & DMA2_BIT != 0 => {
+                (self.dma, self.transfer) = (Dma::default(), None);
+            }
+            (RCC, 0x74) if value & 1 << 24 != 0 => self.reset_flags = 0,
+            (TIM2, 0) if value & 1 != 0 && self.timer_started_ns.is_none() => {
                 self.timer_started_ns = Some(self.now_ns);
-                // The counter starts at what the compare registers hold after a reset: both
-                // match, though no alarm was set.
-                self.timer_flags |= 6;
+                // The counter starts at what the compare register holds after a reset: it matches, though no alarm was
+                // set.
+                self.timer_flags |= 2;
             }
-            o if o == TIM2 + 0x10 => self.timer_flags &= value,
-            o if o == TIM2 + 0x14 => {
-                self.timer_flags |= value & 6;
-                if value & 2 != 0 {
-                    self.alarms[0].at_ns = None;
-                }
+            (TIM2, 0x10) => self.timer_flags &= value,
+            (TIM2, 0x14) => {
+                self.timer_flags |= value & 2;
+                self.alarm_ns = self.alarm_ns.filter(|_| value & 2 == 0);
             }
-            o if o == TIM2 + 0x34 => self.set_alarm(0, value),
-            o if o == TIM2 + 0x38 => self.set_alarm(1, value),
-            o if (FLASH..OPTCR).contains(&o) => {
-                self.flash.write_register(o - FLASH, value, self.now_ns)
-            }
-            o if (RCC..RCC + 0x10).contains(&o) => self.clocks.write(o - RCC, value, self.now_ns),
-            o if (IWDG..IWDG + 0x10).contains(&o) => {
-                self.watchdog.write(o - IWDG, value, self.now_ns)
-            }
-            o if o == AHB1RSTR && value & DMA2_BIT != 0 => {
-                self.dma = Dma::default();
-                self.transfer = None;
-            }
-            o if (DMA2..DMA2 + 0x400).contains(&o) => {
-                self.dma.write(o - DMA2, value);
+            (TIM2, 0x34) => self.set_alarm(value),
+            (FLASH, at @ 0..0x14) => self.flash.write_register(at, value, self.now_ns),
+            (IWDG, at) => self.watchdog.write(at, value, self.now_ns),
+            (DMA2, at) => {
+                self.dma.write(at, value);
                 self.start_transfer();
             }
-            o if o == SPI1 + 4 => {
+            (SPI1, 4) => {
                 self.data_read = false;
                 self.start_transfer();
             }
-            o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
-                self.set_pins(o, value)
-            }
-            o if (CAN1..CAN1 + 0x400).contains(&o) => {
+            (GPIOA | GPIOB | GPIOC, 0x18) => self.set_pins(offset - 0x18, value),
+            (CAN1, at) => {
                 let filled = self.can.filled;
-                self.can.write(o - CAN1, value, self.now_ns);
+                self.can.write(at, value, self.now_ns);
                 if self.can.filled != filled {
                     self.instructions_at_mailbox = self.instructions;
                 }
@@ -306,13 +294,13 @@ impl Peripherals {
         BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
     }
 
-    fn set_alarm(&mut self, k: usize, compare: u32) {
+    fn set_alarm(&mut self, compare: u32) {
         let left = compare.wrapping_sub(self.timer_us());
         let start = self.timer_started_ns.unwrap_or(self.now_ns);
         let us = (self.now_ns - start) / US + u64::from(left);
-        let late_ns = k as i64 * self.settled_jitter_ns;
-        let at_ns = (left > 0).then_some((start + us * US).saturating_add_signed(late_ns));
-        self.alarms[k] = Alarm { at_ns };
+        self.alarm_settles = std::mem::take(&mut self.triggered);
+        let late_ns = i64::from(self.alarm_settles) * self.settled_jitter_ns;
+        self.alarm_ns = (left > 0).then_some((start + us * US).saturating_add_signed(late_ns));
     }
 
     /// Channel 3 of TIM2 (RM0090 rev. 18, sections 18.3.5, 18.4.8, 18.4.9): it captures the timer when its input falls, if the
@@ -336,32 +324,33 @@ impl Peripherals {
         u32::from(pulled_up || inside == 1) << pin
     }
 
-    fn set_pins(&mut self, register: usize, value: u32) {
-        let level = |pin: u32| match (value >> pin & 1, value >> (16 + pin) & 1) {
-            (1, _) => Some(true),
-            (_, 1) => Some(false),
-            _ => None,
-        };
-        match register {
-            o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
-                Some(false) if !self.selected => {
-                    self.selected = true;
-                    self.adc.select(self.now_ns);
-                }
-                Some(true) if self.selected => {
-                    self.selected = false;
+    fn set_pins(&mut self, port: usize, value: u32) {
+        let pin = [(GPIOA, SELECT_PIN), (GPIOB, SYNC_PIN), (GPIOC, LED_PIN)];
+        let pin = pin
+            .iter()
+            .find(|(of, _)| *of == port)
+            .map_or(0, |(_, pin)| *pin);
+        let high = value >> pin & 1 == 1;
+        if !high && value >> (16 + pin) & 1 == 0 {
+            return;
+        }
+        match port {
+            GPIOA if high == self.selected => {
+                self.selected = !high;
+                if high {
                     // What is not through by now is lost.
                     self.transfer = None;
                     self.adc.deselect(self.now_ns);
-                }
-                _ => {}
-            },
-            o if o == GPIOB + 0x18 => {
-                if let Some(high) = level(SYNC_PIN) {
-                    self.adc.control(high, self.now_ns);
+                } else {
+                    self.adc.select(self.now_ns);
                 }
             }
-            _ => self.led = level(LED_PIN).unwrap_or(self.led),
+            GPIOB => {
+                self.triggered |= !high;
+                self.adc.control(high, self.now_ns);
+            }
+            GPIOC => self.led = high,
+            _ => {}
         }
     }
 

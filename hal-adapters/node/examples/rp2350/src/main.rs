@@ -99,13 +99,12 @@ fn main() -> ! {
     };
     let facts = before.record.facts(0, board_check::NO_KEY);
     let mut controller = Controller::start(parts, settings, &before, facts);
+    let mut due_us = controller.due_us();
     loop {
-        while !is_past(controller.due_us()) {
+        while !is_past(due_us) {
             controller.mailbox_empty();
         }
-        let settled_us = controller.trigger();
-        while !is_past(settled_us) {}
-        controller.finish();
+        due_us = controller.turn();
     }
 }
 

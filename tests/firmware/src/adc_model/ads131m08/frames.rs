@@ -164,7 +164,7 @@ impl Ads131m08 {
                     self.registers[register] = data;
                     self.map_changed_ns = Some(now_ns);
                     if self.osr() != osr {
-                        self.restart(now_ns, false);
+                        self.restart(now_ns);
                     }
                 }
                 self.response = Some(0x4000 | command & 0x1f80);

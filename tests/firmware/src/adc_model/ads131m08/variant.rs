@@ -13,6 +13,12 @@ pub struct Variant {
     pub late_pop: bool,
 }
 
+impl Default for Variant {
+    fn default() -> Self {
+        Self::ALL[0]
+    }
+}
+
 impl Variant {
     /// All plausible behaviours, the plainest first.
     pub const ALL: [Self; 8] = {
