@@ -145,17 +145,24 @@ fn parse_screen<'l>(
         (_, Ok(id)) => id,
     };
     let length = length.parse().ok()?;
-    let mut bytes = [0; 8];
-    let mut read = 0;
-    for pair in rest {
-        if pair == "remote" {
-            return BusFrame::new_remote(id, length).map(Ok);
-        }
-        let is_pair = pair.len() == 2 && pair.bytes().all(|digit| digit.is_ascii_hexdigit());
-        *bytes.get_mut(read).filter(|_| is_pair)? = u8::from_str_radix(pair, 16).ok()?;
-        read += 1;
+    let mut pairs = rest.peekable();
+    if pairs.peek() == Some(&"remote") {
+        return BusFrame::new_remote(id, length).map(Ok);
     }
-    BusFrame::new(id, bytes.get(..length).filter(|_| read == length)?).map(Ok)
+    let frame = parse_bytes(id, pairs.map(|pair| pair.as_bytes().try_into().ok()))?;
+    (frame.dlc() == length).then_some(Ok(frame))
+}
+
+/// The frame of these pairs of digits.
+fn parse_bytes(id: Id, pairs: impl Iterator<Item = Option<[u8; 2]>>) -> Option<BusFrame> {
+    let digit = |b: u8| char::from(b).to_digit(16).map(|d| d as u8);
+    let (mut bytes, mut length) = ([0; 8], 0);
+    for pair in pairs {
+        let [high, low] = pair?;
+        *bytes.get_mut(length)? = digit(high)? << 4 | digit(low)?;
+        length += 1;
+    }
+    BusFrame::new(id, bytes.get(..length)?)
 }
 
 fn parse_data(id: Id, text: &str) -> Option<BusFrame> {
@@ -167,17 +174,9 @@ fn parse_data(id: Id, text: &str) -> Option<BusFrame> {
         };
         return BusFrame::new_remote(id, dlc);
     }
-    let digits = text.as_bytes();
-    let (pairs, rest) = digits.as_chunks::<2>();
-    if !rest.is_empty() || pairs.len() > 8 {
-        return None;
-    }
-    let digit = |b: u8| char::from(b).to_digit(16).map(|d| d as u8);
-    let mut bytes = [0; 8];
-    for (byte, [high, low]) in bytes.iter_mut().zip(pairs) {
-        *byte = digit(*high)? << 4 | digit(*low)?;
-    }
-    BusFrame::new(id, bytes.get(..pairs.len())?)
+    let (pairs, rest) = text.as_bytes().as_chunks();
+    rest.is_empty().then_some(())?;
+    parse_bytes(id, pairs.iter().map(|pair| Some(*pair)))
 }
 
 impl Display for LogLine<'_> {

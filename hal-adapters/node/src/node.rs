@@ -92,9 +92,7 @@ impl<'s> Node<'s> {
         settings: Settings<'s>,
     ) -> Self {
         let Settings {
-            identity,
-            period,
-            rezero_limits,
+            identity, period, ..
         } = settings;
         let service = Service::new(period.ticks_per_s());
         Self {
@@ -104,7 +102,7 @@ impl<'s> Node<'s> {
             layout,
             sender: PoseSender::default(),
             temperatures: TemperatureSender::START,
-            service: service.with_rezero_limits(rezero_limits),
+            service: service.with_rezero_limits(settings.rezero_limits),
             has_key: identity.key.is_some(),
             receiver: Receiver::new(identity, period.ticks_per_s()),
             ticks: 0,

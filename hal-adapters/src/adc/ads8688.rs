@@ -93,17 +93,9 @@ pub struct Ads8688<SPI, RST, CLOCK> {
     channels: Channels,
     /// Register that the next tick reads back.
     turn: u8,
-    reference: Reference,
-}
-
-/// Whether codes can be right.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Reference {
-    /// The part was started and not sampled since.
-    Started,
-    /// First sampled at this time, us.
-    SettlingSince(u32),
-    Settled,
+    /// Time of the first sample since the start, us, and whether the reference has settled since.
+    first_us: Option<u32>,
+    is_settled: bool,
 }
 
 impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> Ads8688<SPI, RST, CLOCK> {
@@ -115,7 +107,8 @@ impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> Ads8688<SPI, RST, CLOCK> {
             clock,
             channels,
             turn: AUTO_SEQ_EN,
-            reference: Reference::Started,
+            first_us: None,
+            is_settled: false,
         }
     }
 
@@ -179,18 +172,6 @@ impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> Ads8688<SPI, RST, CLOCK> {
         self.exchange(u16::from(register) << 9 | 1 << 8 | self.wanted(register))?;
         self.check(register)
     }
-
-    /// Whether the reference has settled at `now_us`.
-    const fn settled(&mut self, now_us: u32) -> bool {
-        self.reference = match self.reference {
-            Reference::Started => Reference::SettlingSince(now_us),
-            Reference::SettlingSince(us) if now_us.wrapping_sub(us) < REFERENCE_US => {
-                Reference::SettlingSince(us)
-            }
-            Reference::SettlingSince(_) | Reference::Settled => Reference::Settled,
-        };
-        matches!(self.reference, Reference::Settled)
-    }
 }
 
 impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> FrameSampler for Ads8688<SPI, RST, CLOCK> {
@@ -205,7 +186,7 @@ impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> FrameSampler for Ads8688<SPI,
     const CODE_BITS: u32 = 16;
 
     fn start(&mut self) -> Result<(), AdcError<SPI::Error>> {
-        self.reference = Reference::Started;
+        (self.first_us, self.is_settled) = (None, false);
         self.turn = AUTO_SEQ_EN;
         self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         self.exchange(RST)?;
@@ -248,7 +229,9 @@ impl<SPI: SpiDevice, RST: OutputPin, CLOCK: Clock> FrameSampler for Ads8688<SPI,
             _ => register + 1,
         };
         self.check(register)?;
-        if !self.settled(time_us) {
+        let first_us = *self.first_us.get_or_insert(time_us);
+        self.is_settled |= time_us.wrapping_sub(first_us) >= REFERENCE_US;
+        if !self.is_settled {
             return Err(AdcError::NotReady { ready: 0, read });
         }
         if span_us > SPAN_US {

@@ -16,7 +16,7 @@ fn on_part<T>(
     work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock, Line>) -> T,
 ) -> T {
     testing::on_part(Ads8688::new, Line::every(4), expected, &[], |adc| {
-        adc.reference = Reference::Settled;
+        adc.is_settled = true;
         work(adc)
     })
 }
@@ -86,7 +86,7 @@ fn hall_codes_that_take_too_long_have_no_instant() {
         &tick(0x01, 0x3f),
         &[],
         |adc| {
-            adc.reference = Reference::Settled;
+            adc.is_settled = true;
             adc.sample(7)
         },
     );
