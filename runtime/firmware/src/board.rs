@@ -80,10 +80,9 @@ pub const TIMER_HZ: u32 = 2 * BUS_1_HZ;
 /// 168 MHz from the crystal or from the internal oscillator; 42 MHz and 84 MHz on the peripheral
 /// buses.
 pub fn clocks(crystal: bool) -> Config {
-    let source = if crystal {
-        Config::hse(Hertz::from_raw(CRYSTAL_HZ))
-    } else {
-        Config::hsi()
+    let source = match crystal {
+        true => Config::hse(Hertz::from_raw(CRYSTAL_HZ)),
+        false => Config::hsi(),
     };
     source
         .sysclk(Hertz::from_raw(CORE_HZ))
@@ -127,23 +126,18 @@ pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
 
 /// The stage.
 pub fn settings() -> Settings<'static> {
-    let identity = Identity {
-        serial: STAGE_SERIAL,
-        key: crate::seal::key(),
-        node: STAGE_NODE,
-        program_version: PROGRAM_VERSION,
-    };
     Settings {
-        identity,
+        identity: Identity {
+            serial: STAGE_SERIAL,
+            key: crate::seal::key(),
+            node: STAGE_NODE,
+            program_version: PROGRAM_VERSION,
+        },
         period: PERIOD,
-        rezero_limits: rezero_limits(),
+        // Limits of rest at the zero. A stage may rest lower or tilted while its servo is off: then `vertical_max` and the
+        // range of its calibration must hold this position.
+        rezero_limits: ZeroOffsetSettings::default(),
     }
-}
-
-/// Limits of rest at the zero. A stage may rest lower or tilted while its servo is off: then `vertical_max` and the range
-/// of its calibration must hold this position.
-fn rezero_limits() -> ZeroOffsetSettings {
-    ZeroOffsetSettings::default()
 }
 
 /// The controller's stage, `STAGE_SERIAL` in the environment of the build: blobs of other stages are refused.

@@ -19,13 +19,10 @@ fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
-    let at = info.location();
-    let address = at.map_or(0, |place| core::ptr::from_ref(place) as u32);
-    reset_by(
-        FaultKind::Panic,
-        address,
-        at.map_or(0, |place| place.line()),
-    )
+    let place =
+        |place: &core::panic::Location<'_>| (core::ptr::from_ref(place) as u32, place.line());
+    let (address, line) = info.location().map_or((0, 0), place);
+    reset_by(FaultKind::Panic, address, line)
 }
 
 /// Makes every write to the 1 MiB below the stack a fault. System memory and reserved addresses lie there; the manual is
