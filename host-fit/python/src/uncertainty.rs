@@ -49,9 +49,7 @@ impl Decoder {
             let known = known.at(&frame.decode(&decoder, &PlanarPose::ZERO));
             known.map_or([f64::NAN; 3], |[own, all]| if whole { all } else { own })
         };
-        let all_at = |frames: &[LoggedFrame]| frames.par_iter().map(&at).collect::<Vec<_>>();
-        let mut found = Vec::new();
-        match Given::new(log, hall, caps, [mount, body])? {
+        let frames: Vec<LoggedFrame> = match Given::new(log, hall, caps, [mount, body])? {
             Given::Log(log) => {
                 let text = log.text.clone();
                 let read = work::run(py, move |watch| {
@@ -61,21 +59,17 @@ impl Decoder {
                     });
                     read.map(|_: LogReading| frames)
                 })?;
-                let frames = read.map_err(|error| log_error(py, &error))?;
-                for frames in frames.chunks(ROWS_AT_ONCE) {
-                    found.extend(py.detach(|| all_at(frames)));
-                    py.check_signals()?;
-                }
+                read.map_err(|error| log_error(py, &error))?
             }
             Given::Codes(given) => {
                 let rows = given.rows()?;
-                for start in (0..rows.len()).step_by(ROWS_AT_ONCE) {
-                    let frames = rows.frames(start..rows.len().min(start + ROWS_AT_ONCE));
-                    let frames: Vec<LoggedFrame> = frames.map(LoggedFrame::from).collect();
-                    found.extend(py.detach(|| all_at(&frames)));
-                    py.check_signals()?;
-                }
+                rows.frames(0..rows.len()).map(LoggedFrame::from).collect()
             }
+        };
+        let mut found = Vec::new();
+        for frames in frames.chunks(ROWS_AT_ONCE) {
+            found.extend(py.detach(|| frames.par_iter().map(&at).collect::<Vec<_>>()));
+            py.check_signals()?;
         }
         rows_of_three(py, found)
     }
