@@ -9,6 +9,8 @@ const SPI1_DR: u32 = 0x4001_300c;
 /// Registers of a stream, and from one stream's to the next one's (section 10.5.11).
 const STREAMS: usize = 0x10;
 const STRIDE: usize = 0x18;
+/// Words of a stream: DMA_SxCR, DMA_SxNDTR, DMA_SxPAR, DMA_SxM0AR; two are not modelled.
+const WORDS: usize = STRIDE / 4;
 /// Bits of DMA_SxCR (section 10.5.5).
 const ENABLE: u32 = 1;
 const NEXT_ADDRESS: u32 = 1 << 10;
@@ -37,18 +39,10 @@ const fn listens_to(stream: usize, channel: u32) -> Option<Request> {
     }
 }
 
-#[derive(Clone, Copy, Default)]
-struct Stream {
-    control: u32,
-    count: u32,
-    peripheral: u32,
-    memory: u32,
-}
-
 /// Streams and their flags, LISR below HISR.
 #[derive(Default)]
 pub struct Dma {
-    streams: [Stream; 8],
+    streams: [[u32; WORDS]; 8],
     flags: u64,
 }
 
@@ -79,16 +73,7 @@ impl Dma {
         match offset {
             0x0 => self.flags as u32,
             0x4 => (self.flags >> 32) as u32,
-            STREAMS.. => {
-                let stream = &self.streams[(offset - STREAMS) / STRIDE];
-                match (offset - STREAMS) % STRIDE {
-                    0x0 => stream.control,
-                    0x4 => stream.count,
-                    0x8 => stream.peripheral,
-                    0xc => stream.memory,
-                    _ => 0,
-                }
-            }
+            STREAMS.. => self.streams.as_flattened()[(offset - STREAMS) / 4],
             _ => 0,
         }
     }
@@ -99,18 +84,14 @@ impl Dma {
             0x8 => self.flags &= !u64::from(value),
             0xc => self.flags &= !(u64::from(value) << 32),
             STREAMS.. => {
-                let k = (offset - STREAMS) / STRIDE;
+                let (k, word) = ((offset - STREAMS) / STRIDE, (offset - STREAMS) % STRIDE / 4);
                 let flags = self.flags >> shift(k) & ALL;
                 let stream = &mut self.streams[k];
-                let is_on = stream.control & ENABLE != 0;
-                match (offset - STREAMS) % STRIDE {
+                match (word, stream[0] & ENABLE) {
                     // Flags of an earlier transfer must be cleared before (section 10.3.17).
-                    0x0 if is_on => stream.control &= !ENABLE | value & ENABLE,
-                    0x0 if flags == 0 => stream.control = value,
-                    0x0 => stream.control = value & !ENABLE,
-                    0x4 if !is_on => stream.count = value & 0xffff,
-                    0x8 if !is_on => stream.peripheral = value,
-                    0xc if !is_on => stream.memory = value,
+                    (0, 0) if flags != 0 => stream[0] = value & !ENABLE,
+                    (0, ENABLE) => stream[0] &= !ENABLE | value & ENABLE,
+                    (_, 0) => stream[word] = value,
                     _ => {}
                 }
             }
@@ -122,23 +103,28 @@ impl Dma {
     /// RAM, ends with an error.
     pub fn serves(&mut self, request: Request) -> Option<Side> {
         let direction = u32::from(request == Request::Spi1Tx);
-        let (k, stream) = self.streams.iter_mut().enumerate().find(|(k, stream)| {
-            stream.control & ENABLE != 0
-                && listens_to(*k, stream.control >> 25 & 7) == Some(request)
-        })?;
-        let count = stream.count as usize;
-        let bytes = match stream.control & NEXT_ADDRESS {
-            0 => 1,
-            _ => count,
+        let (k, stream) = self
+            .streams
+            .iter_mut()
+            .enumerate()
+            .find(|(k, [control, ..])| {
+                control & ENABLE != 0 && listens_to(*k, control >> 25 & 7) == Some(request)
+            })?;
+        let [control, count, peripheral, memory, ..] = *stream;
+        let count = (count & 0xffff) as usize;
+        let bytes = if control & NEXT_ADDRESS == 0 {
+            1
+        } else {
+            count
         };
-        let at = stream.memory.wrapping_sub(RAM) as usize;
-        let is_sound = stream.control & NOT_MODELLED == 0
-            && stream.control >> 6 & 3 == direction
-            && stream.peripheral == SPI1_DR
+        let at = memory.wrapping_sub(RAM) as usize;
+        let is_sound = control & NOT_MODELLED == 0
+            && control >> 6 & 3 == direction
+            && peripheral == SPI1_DR
             && count > 0
             && at.saturating_add(bytes) <= RAM_BYTES;
         if !is_sound {
-            stream.control &= !ENABLE;
+            stream[0] &= !ENABLE;
             self.flags |= ERROR << shift(k);
             return None;
         }
@@ -152,10 +138,10 @@ impl Dma {
 
     /// So many bytes of it are through: one that has transferred all is off.
     pub fn transferred(&mut self, side: &Side, bytes: usize) {
-        let stream = &mut self.streams[side.stream];
-        stream.count -= bytes as u32;
-        if stream.count == 0 {
-            stream.control &= !ENABLE;
+        let [control, count, ..] = &mut self.streams[side.stream];
+        *count -= bytes as u32;
+        if *count == 0 {
+            *control &= !ENABLE;
             self.flags |= COMPLETE << shift(side.stream);
         }
     }
