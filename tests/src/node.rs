@@ -77,7 +77,7 @@ impl Node {
     /// One tick, so much late: decodes codes, takes frames of the bus, and stores an update.
     /// Returns whether it stored one, which takes half a second.
     pub fn tick(&mut self, late_us: u32, received: impl IntoIterator<Item = BusFrame>) -> bool {
-        self.controller.can().received.extend(received);
+        self.controller.bus.can.received.extend(received);
         let now_us = self.controller.due_us().wrapping_add(late_us);
         self.controller.board.now_us = now_us;
         self.controller.turn();
@@ -87,12 +87,12 @@ impl Node {
 
     /// Whether a zero deviation is subtracted.
     pub fn is_zeroed(&self) -> bool {
-        self.controller.node().zero() != PlanarPose::ZERO
+        self.controller.node.zero() != PlanarPose::ZERO
     }
 
     /// The next frame for the bus.
     pub fn send(&mut self) -> Option<Coded> {
-        let wire = self.controller.can();
+        let wire = &mut self.controller.bus.can;
         let frame = wire.mailbox.take()?;
         wire.sent += 1;
         self.controller.mailbox_empty();
@@ -127,7 +127,7 @@ impl Node {
 
     /// A copy of its flash.
     fn flash(&mut self) -> FlashModel {
-        self.controller.records().slots().flash.clone()
+        self.controller.records.slots.flash.clone()
     }
 
     /// The blob that the next power-on would run.
@@ -136,7 +136,7 @@ impl Node {
         let (mut records, _) = Records::start(slots(self.flash()), Choice::Newest, serial);
         let newest = records.newest()?;
         [0, 1].into_iter().find_map(|slot| {
-            let image = records.slots().image(slot);
+            let image = records.slots.image(slot);
             let stored = image.stored(slot)?;
             let is_newest = (stored.sequence, stored.crc) == (newest.sequence, newest.crc);
             is_newest.then(|| image.blob()[..stored.bytes as usize].to_vec())
@@ -145,7 +145,7 @@ impl Node {
 
     /// The highest sequence number; 0 for a plain blob.
     pub fn records(&mut self) -> u32 {
-        self.controller.records().newest_sequence()
+        self.controller.records.newest_sequence()
     }
 }
 

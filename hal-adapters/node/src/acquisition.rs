@@ -18,8 +18,10 @@ pub struct Acquisition<A: FrameSampler> {
     trigger_fault: Option<AdcError<A::Bus>>,
     restart_ticks: u32,
     faults_in_a_row: u32,
-    faults: u32,
-    starts: u32,
+    /// Ticks without codes since the program started. Saturates.
+    pub faults: u32,
+    /// How often the converter was started, the first time included. Saturates.
+    pub starts: u32,
 }
 
 impl<A: FrameSampler> Acquisition<A> {
@@ -66,16 +68,6 @@ impl<A: FrameSampler> Acquisition<A> {
             self.faults_in_a_row = self.faults_in_a_row.saturating_add(1);
         }
         result
-    }
-
-    /// Ticks without codes since the program started. Saturates.
-    pub const fn faults(&self) -> u32 {
-        self.faults
-    }
-
-    /// How often the converter was started, the first time included. Saturates.
-    pub const fn starts(&self) -> u32 {
-        self.starts
     }
 
     fn try_sample(&mut self, sequence: u32) -> Result<RawFrame, AdcError<A::Bus>> {

@@ -63,7 +63,8 @@ pub struct CanState {
 /// The controller and the frames that wait for it.
 #[derive(Debug)]
 pub struct Bus<C> {
-    can: C,
+    /// The CAN controller.
+    pub can: C,
     apart_ticks_max: u32,
     /// Ticks in a row while the controller took no part in the bus.
     apart_ticks: u32,
@@ -91,11 +92,6 @@ impl<C: Can> Bus<C> {
             overruns: 0,
             outbox: Outbox::new(),
         }
-    }
-
-    /// The CAN controller.
-    pub const fn can(&mut self) -> &mut C {
-        &mut self.can
     }
 
     /// Whether the controller has not been apart from the bus for long.

@@ -16,6 +16,7 @@ use embedded_storage::nor_flash::MultiwriteNorFlash;
 use hal_adapters::adc::FrameSampler;
 use hal_adapters::can::Layout;
 use hal_adapters::can::status::{BoardFacts, board_check};
+use hal_adapters::can::update::Store;
 use runtime::{PlanarPose, Status};
 
 /// Longest wait of a reset or an erase for the answers to leave, ms.
@@ -38,16 +39,19 @@ pub struct Parts<A, C, F, B> {
 pub struct Controller<'s, A: FrameSampler, C, F, B> {
     /// The board.
     pub board: B,
-    bus: Bus<C>,
+    /// The CAN bus.
+    pub bus: Bus<C>,
     schedule: Schedule,
     /// The tick while its codes settle.
     open: Option<Tick>,
     acquisition: Acquisition<A>,
-    node: Node<'s>,
+    /// The node.
+    pub node: Node<'s>,
     facts: Facts,
     /// The zero deviation in the retained record.
     zero: PlanarPose<f32>,
-    records: Records<F>,
+    /// The parameters in flash.
+    pub records: Records<F>,
     constants: Constants,
     silence_ticks_max: u32,
     /// Ticks that a reset or an erase has waited for the answers to leave.
@@ -73,13 +77,13 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         fpu::restore();
         let is_sound = runtime::arithmetic::check().is_ok() && fpu::defaults_are_sound();
         // Without sound arithmetic no blob runs.
-        let loaded = match is_sound {
+        let decoder = match is_sound {
             true => records.load(before.choice),
             false => None,
         };
-        let blob = loaded.as_ref().map_or(0, |loaded| loaded.crc);
-        let stop = before.stop(loaded.is_some());
-        let parameters = Parameters::at_start(loaded, refusal, stop, is_sound);
+        let blob = records.running().map_or(0, |running| running.id.crc);
+        let stop = before.stop(decoder.is_some());
+        let parameters = Parameters::at_start(decoder, refusal, stop, is_sound);
         let layout = Layout::from_bits(A::CODE_BITS);
         let mut node = Node::new(parameters, before.by_fault, layout, settings);
         let zero_lost = before.restore_zero(&mut node, blob);
@@ -171,12 +175,12 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
 
         let counters = [
             self.overrun_ticks,
-            self.acquisition.faults(),
-            self.acquisition.starts(),
+            self.acquisition.faults,
+            self.acquisition.starts,
             self.bus.sent,
-            self.bus.outbox.dropped(),
+            self.bus.outbox.dropped,
             self.bus.overruns,
-            self.node.fpu_restored(),
+            self.node.fpu_restored,
         ];
         STAGE.put(tick.sequence, tick.started_us, &reading, counters);
         if self.schedule.is_kept(&tick, self.board.now_us()) {
@@ -191,27 +195,12 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
         self.bus.send();
     }
 
-    /// The CAN controller.
-    pub const fn can(&mut self) -> &mut C {
-        self.bus.can()
-    }
-
-    /// The node.
-    pub const fn node(&self) -> &Node<'s> {
-        &self.node
-    }
-
-    /// The parameters in flash.
-    pub const fn records(&mut self) -> &mut Records<F> {
-        &mut self.records
-    }
-
     fn note_facts(&mut self) {
         let facts = &mut self.facts;
-        facts.missed_ticks = self.schedule.missed();
+        facts.missed_ticks = self.schedule.missed;
         facts.bus_off = self.bus.bus_off;
         facts.servo_off_pin = self.board.servo_is_off();
-        let is_low = (self.records.slots().supply_is_low)();
+        let is_low = (self.records.slots.supply_is_low)();
         facts.note(board_check::SUPPLY_LOW, is_low);
         facts.note(board_check::CAN_NOT_STARTED, !self.bus.takes_part());
     }
@@ -229,7 +218,7 @@ impl<'s, A: FrameSampler, C: Can, F: MultiwriteNorFlash, B: Board> Controller<'s
             self.zero = zero;
             self.board.record().update(|record| record.zero = zero);
         }
-        if self.node.ticks() == self.proven_ticks {
+        if self.node.ticks == self.proven_ticks {
             self.board.record().update(Retained::prove);
         }
     }

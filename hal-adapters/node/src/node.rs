@@ -75,9 +75,11 @@ pub struct Node<'s> {
     service: Service,
     receiver: Receiver<'s>,
     has_key: bool,
-    ticks: u32,
+    /// Ticks since start.
+    pub ticks: u32,
     state: (NodeState, u8),
-    fpu_restored: u32,
+    /// Ticks with changed settings of the FPU.
+    pub fpu_restored: u32,
     board_checks: u32,
     /// Times the bus was off, as the last state says.
     bus_off_sent: u32,
@@ -135,21 +137,6 @@ impl<'s> Node<'s> {
             Some(servo) => Some(servo.decoder()),
             None => None,
         }
-    }
-
-    /// State and reason after the last tick.
-    pub const fn state(&self) -> (NodeState, u8) {
-        self.state
-    }
-
-    /// Ticks since start.
-    pub const fn ticks(&self) -> u32 {
-        self.ticks
-    }
-
-    /// Ticks with changed settings of the FPU.
-    pub const fn fpu_restored(&self) -> u32 {
-        self.fpu_restored
     }
 
     /// Whether the LED is to be on.

@@ -3,14 +3,14 @@
 extern crate std;
 
 use super::*;
-use crate::records::{Choice, Loaded, Records};
+use crate::records::{Choice, Records};
 use crate::store::flash_model::{FlashModel, slots};
 use crate::store::tests::blob;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
 use std::vec::Vec;
 
-fn loaded() -> Loaded {
+fn loaded() -> AnyDecoder {
     let mut flash = FlashModel::erased();
     flash.load(0, &blob(0));
     let (mut records, _) = Records::start(slots(flash), Choice::Newest, None);

@@ -23,7 +23,8 @@ pub struct Outbox {
     lasting: Deque<Coded, LASTING_MAX>,
     /// Whether the first of them is in a mailbox.
     answers: bool,
-    dropped: u32,
+    /// Frames that were never sent. Saturates.
+    pub dropped: u32,
 }
 
 impl Outbox {
@@ -96,11 +97,6 @@ impl Outbox {
         self.fresh.clear();
     }
 
-    /// Frames that were never sent. Saturates.
-    pub const fn dropped(&self) -> u32 {
-        self.dropped
-    }
-
     const fn count_dropped(&mut self, frames: u32) {
         self.dropped = self.dropped.saturating_add(frames);
     }
@@ -123,10 +119,10 @@ mod tests {
     fn frames_left_over_and_frames_too_many_are_counted() {
         let mut outbox = Outbox::new();
         (0..FRESH_MAX + 2).for_each(|_| outbox.push(frame(Message::PoseX)));
-        assert_eq!(outbox.dropped(), 2);
+        assert_eq!(outbox.dropped, 2);
         assert_eq!(outbox.pop(), Some(frame(Message::PoseX)));
         outbox.start_tick();
-        assert_eq!(outbox.dropped(), 2 + FRESH_MAX as u32 - 1);
+        assert_eq!(outbox.dropped, 2 + FRESH_MAX as u32 - 1);
         assert_eq!(outbox.front(true), None);
     }
 
@@ -152,6 +148,6 @@ mod tests {
         assert_eq!(next(&mut outbox, true), Some(Message::Answer));
         assert_eq!(next(&mut outbox, true), None);
         assert!(outbox.is_empty());
-        assert_eq!(outbox.dropped(), 2);
+        assert_eq!(outbox.dropped, 2);
     }
 }

@@ -18,19 +18,11 @@ pub enum Choice {
     Nothing,
 }
 
-/// The content of a sound blob.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The decoder.
-    pub decoder: AnyDecoder,
-    /// CRC of the blob.
-    pub crc: u32,
-}
-
 /// Both slots with their flash.
 #[derive(Debug)]
 pub struct Records<F> {
-    slots: Slots<F>,
+    /// The flash.
+    pub slots: Slots<F>,
     /// The blobs that may run.
     stored: [Option<Stored>; SLOTS],
     /// The highest sequence number of any blob.
@@ -94,8 +86,8 @@ impl<F: MultiwriteNorFlash> Records<F> {
         }
     }
 
-    /// Loads the chosen blob, which runs from now on. `None` if it is not there.
-    pub fn load(&mut self, choice: Choice) -> Option<Loaded> {
+    /// Loads the chosen blob, which runs from now on, and gives its decoder. `None` if it is not there.
+    pub fn load(&mut self, choice: Choice) -> Option<AnyDecoder> {
         let stored = match choice {
             Choice::Newest => self.latest(|_| true),
             Choice::Blob(crc) => self.latest(|stored| stored.crc == crc),
@@ -105,21 +97,13 @@ impl<F: MultiwriteNorFlash> Records<F> {
         let read = ParameterSet::from_flash(image.blob());
         let set = read.as_ref().ok()?;
         self.running = Some((stored, set.serial.clone()));
-        Some(Loaded {
-            decoder: set.decoder(),
-            crc: stored.crc,
-        })
+        Some(set.decoder())
     }
 
     /// The selected blob with the highest sequence number; slot 0 comes first among equal numbers.
     fn latest(&self, select: impl Fn(&Stored) -> bool) -> Option<Stored> {
         let stored = self.stored.iter().rev().flatten().copied();
         stored.filter(select).max_by_key(|stored| stored.sequence)
-    }
-
-    /// The flash.
-    pub const fn slots(&mut self) -> &mut Slots<F> {
-        &mut self.slots
     }
 
     /// The slot that may be erased: the running blob stays, or the newest blob if none runs.

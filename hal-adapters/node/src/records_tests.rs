@@ -6,7 +6,8 @@ use crate::store::tests::{SERIAL, blob, crc, update};
 
 fn runs(flash: &mut FlashModel, choice: Choice) -> Option<u32> {
     let (mut records, _) = Records::start(slots(flash), choice, SERIAL);
-    records.load(choice).map(|loaded| loaded.crc)
+    records.load(choice)?;
+    records.running().map(|running| running.id.crc)
 }
 
 #[test]

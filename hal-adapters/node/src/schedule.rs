@@ -64,7 +64,8 @@ pub struct Schedule {
     period: Period,
     due_us: u32,
     sequence: u32,
-    missed: u32,
+    /// Ticks that came more than [`LATE_US`] late or not at all. Saturates.
+    pub missed: u32,
 }
 
 impl Schedule {
@@ -81,11 +82,6 @@ impl Schedule {
     /// When the next tick is due, us of the timer.
     pub const fn due_us(&self) -> u32 {
         self.due_us
-    }
-
-    /// Ticks that came more than [`LATE_US`] late or not at all. Saturates.
-    pub const fn missed(&self) -> u32 {
-        self.missed
     }
 
     /// The tick that starts at `now_us`, not before its due time. The ticks of whole periods since then are missed, and

@@ -265,19 +265,6 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
         compare(MODE_REGISTER, found, MODE_WANTED)?;
         self.measure_edges()
     }
-
-    /// Whether the part reported a resynchronisation in this tick.
-    fn count_unsynced(&mut self, is_synced: bool) -> Result<(), AdcError<SPI::Error>> {
-        self.unsynced_ticks = if is_synced {
-            0
-        } else {
-            self.unsynced_ticks.saturating_add(1)
-        };
-        if self.unsynced_ticks >= UNSYNCED_TICKS {
-            return Err(AdcError::NoSync);
-        }
-        Ok(())
-    }
 }
 
 /// Where commands have the address of a register.
@@ -372,7 +359,13 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
         if ready != read {
             return Err(AdcError::NotReady { ready, read });
         }
-        self.count_unsynced(statuses & F_RESYNC != 0)?;
+        self.unsynced_ticks = match statuses & F_RESYNC {
+            0 => self.unsynced_ticks.saturating_add(1),
+            _ => 0,
+        };
+        if self.unsynced_ticks >= UNSYNCED_TICKS {
+            return Err(AdcError::NoSync);
+        }
         let (time_us, codes) = found.ok_or(AdcError::UnknownInstant)?;
         let sampled = self.channels.frame(&codes, sequence, time_us);
         let thermometers = &self.channels.thermometers;

@@ -225,11 +225,10 @@ impl Answer {
 
     /// From the 52 bits of a frame.
     pub fn from_payload(p: Payload) -> Self {
-        let outcome = usize::try_from(p.short >> 12 & 0xff).ok();
         Self {
             number: (p.short & 0xf) as u8,
             token: (p.short >> 4) as u8,
-            outcome: outcome.and_then(|k| Outcome::ALL.get(k)).copied(),
+            outcome: Outcome::ALL.get((p.short >> 12 & 0xff) as usize).copied(),
             detail: p.long,
         }
     }

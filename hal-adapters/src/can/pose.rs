@@ -137,28 +137,16 @@ pub struct PoseReceiver {
 
 fn received(tick: &GroupTick) -> ReceivedPose {
     let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
-    let [x, y, rz] = [0, 1, 2].map(|k| tick.payload(k));
-    let status = match (x, y, rz) {
-        (Some(x), Some(y), Some(rz))
-            if x.short == y.short
-                && y.short == rz.short
-                && [x, y, rz]
-                    .map(|axis| f32::from_bits(axis.long))
-                    .iter()
-                    .all(|axis| axis.is_finite()) =>
-        {
-            Status::from_bits(x.short)
-        }
+    let axes = [0, 1, 2].map(|k| tick.payload(k));
+    let values = axes.map(|axis| axis.map_or(0.0, |axis| f32::from_bits(axis.long)));
+    let status = match axes.map(|axis| axis.map(|axis| axis.short)) {
+        [Some(x), Some(y), Some(rz)] if x == y && y == rz => Status::from_bits(x),
         _ => lost,
     };
-    let value = |p: Option<Payload>| p.map_or(0.0, |p| f32::from_bits(p.long));
+    let are_finite = values.iter().all(|value| value.is_finite());
     ReceivedPose {
-        pose: PlanarPose {
-            x_m: value(x),
-            y_m: value(y),
-            rz_rad: value(rz),
-        },
-        status,
+        pose: PlanarPose::from_array(values),
+        status: if are_finite { status } else { lost },
         sequence: tick.sequence,
         time_us: tick.time_us,
     }

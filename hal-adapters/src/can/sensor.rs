@@ -130,13 +130,10 @@ pub(super) const fn read_two(p: Payload) -> [i32; 2] {
 /// missing, never truncated.
 #[inline(always)]
 pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
+    let counter = frame.sequence;
     [
-        Coded::new(Message::Hall, frame.sequence, three_codes(frame.hall)),
-        Coded::new(
-            Message::Capacitive,
-            frame.sequence,
-            three_codes(frame.capacitive),
-        ),
+        Coded::new(Message::Hall, counter, three_codes(frame.hall)),
+        Coded::new(Message::Capacitive, counter, three_codes(frame.capacitive)),
     ]
 }
 
@@ -208,7 +205,7 @@ impl TemperatureSender {
 }
 
 /// Mount and body, m degC, of a frame of [`Message::Temperature`].
-pub(super) const fn read_temperature_mc(p: Payload) -> [i32; 2] {
+pub const fn read_temperature_mc(p: Payload) -> [i32; 2] {
     let [mount_bits, body_bits] = TEMPERATURE_BITS;
     [
         code(p.short, mount_bits, p.long >> 24),

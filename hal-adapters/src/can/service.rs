@@ -205,42 +205,38 @@ impl Service {
         command: &Command,
         servo: Option<&mut PoseTracker<D>>,
     ) -> (Outcome, u32) {
-        let Some(request) = command.request else {
-            return (Outcome::UnknownCommand, 0);
-        };
-        match (request, servo) {
-            (Request::Identify { seconds }, _) => {
-                self.identify_ticks = self.ticks_in(seconds);
-            }
-            (Request::Update(_), _) => return (Outcome::UnknownCommand, 0),
-            (Request::Record { on }, _) => self.is_recording = on,
-            (Request::ServoOff { seconds }, _) => self.servo_off_ticks = self.ticks_in(seconds),
-            (Request::Rezero { .. } | Request::ClearZero, None) => {
-                return (Outcome::NoParameters, 0);
-            }
-            (Request::Rezero { .. } | Request::ClearZero, _) if self.rezero.is_some() => {
-                return (Outcome::Busy, 0);
-            }
-            (Request::Rezero { .. } | Request::ClearZero, _) if !self.servo_is_off() => {
-                return (Outcome::ServoOn, 0);
-            }
-            (Request::ClearZero, Some(servo)) => {
-                servo.set_zero(PlanarPose::ZERO);
-                self.was_refused = false;
-            }
-            (Request::Rezero { ticks }, Some(servo)) => {
-                return self.start_rezero(ticks, command.token, servo);
-            }
+        match command.request {
+            Some(Request::Identify { seconds }) => self.identify_ticks = self.ticks_in(seconds),
+            Some(Request::Record { on }) => self.is_recording = on,
+            Some(Request::ServoOff { seconds }) => self.servo_off_ticks = self.ticks_in(seconds),
+            Some(Request::Rezero { ticks }) => return self.zero(Some(ticks), command.token, servo),
+            Some(Request::ClearZero) => return self.zero(None, command.token, servo),
+            Some(Request::Update(_)) | None => return (Outcome::UnknownCommand, 0),
         }
         (Outcome::Done, 0)
     }
 
-    fn start_rezero<D: Decode>(
+    /// Starts a re-zero of so many ticks, or clears the zero.
+    fn zero<D: Decode>(
         &mut self,
-        ticks: u16,
+        ticks: Option<u16>,
         token: u8,
-        servo: &mut PoseTracker<D>,
+        servo: Option<&mut PoseTracker<D>>,
     ) -> (Outcome, u32) {
+        let Some(servo) = servo else {
+            return (Outcome::NoParameters, 0);
+        };
+        if self.rezero.is_some() {
+            return (Outcome::Busy, 0);
+        }
+        if !self.servo_is_off() {
+            return (Outcome::ServoOn, 0);
+        }
+        self.was_refused = false;
+        let Some(ticks) = ticks else {
+            servo.set_zero(PlanarPose::ZERO);
+            return (Outcome::Done, 0);
+        };
         let mut settings = self.rezero_settings;
         if ticks > 0 {
             settings.ticks = ticks;
@@ -251,7 +247,6 @@ impl Service {
             return Outcome::from_refusal(&refusal);
         }
         self.rezero = Some(token);
-        self.was_refused = false;
         (Outcome::Started, 0)
     }
 

@@ -27,13 +27,6 @@ numbered! {
     }
 }
 
-impl NodeState {
-    /// From its number, or `None` for a state of a later version.
-    fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(number)).copied()
-    }
-}
-
 /// Flags of [`NodeStatus`], as bits.
 pub mod flag {
     /// The last reset came from the watchdog, or from the program on a fault: see page 6 of the
@@ -97,7 +90,7 @@ impl NodeStatus {
     pub fn from_payload(p: Payload) -> Self {
         let [m0, m1, bus_off, version] = p.long.to_le_bytes();
         Self {
-            state: NodeState::from_number((p.short & 0xf) as u8),
+            state: NodeState::ALL.get((p.short & 0xf) as usize).copied(),
             reason: (p.short >> 4) as u8,
             flags: (p.short >> 12) as u8,
             missed_ticks: u16::from_le_bytes([m0, m1]),

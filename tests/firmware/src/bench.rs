@@ -9,9 +9,9 @@ use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Answer, Command, Outcome, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::pose::status_to_bus;
+use hal_adapters::can::sensor::read_temperature_mc;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
 use hal_adapters::can::{Layout, Message, NodeNumber};
-use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Status};
 use std::ffi::OsString;
 use std::path::Path;
@@ -140,16 +140,13 @@ fn columns<const N: usize>(text: &str, names: [&str; N]) -> impl Iterator<Item =
 
 /// The codes of a log.
 pub fn rows(text: &str) -> Vec<Row> {
-    let names = [
-        "hall_a_cnt",
-        "hall_b_cnt",
-        "hall_c_cnt",
-        "cap1_cnt",
-        "cap2_cnt",
-        "cap3_cnt",
-    ];
+    let (hall, caps) = (
+        ["hall_a_cnt", "hall_b_cnt", "hall_c_cnt"],
+        ["cap1_cnt", "cap2_cnt", "cap3_cnt"],
+    );
+    let ([a, b, c], [g1, g2, g3]) = (hall, caps);
     let row = |codes: [f64; 6]| codes.map(|code| code as i32);
-    columns(text, names).map(row).collect()
+    columns(text, [a, b, c, g1, g2, g3]).map(row).collect()
 }
 
 /// One axis of one tick on the bus.
@@ -251,14 +248,7 @@ impl Seen {
                 self.times.push((payload.short, payload.long));
             }
             Message::Temperature => {
-                let signed = |word: u32, bits: u32| (word << (32 - bits)) as i32 >> (32 - bits);
-                let [mount, body] = [(payload.short, 20, 24), (payload.long, 24, 25)].map(
-                    |(word, bits, missing)| match payload.long >> missing & 1 {
-                        0 => signed(word, bits),
-                        _ => MISSING_CODE,
-                    },
-                );
-                self.temperatures.push((tick, [mount, body]));
+                self.temperatures.push((tick, read_temperature_mc(payload)));
             }
             _ if Layout::from_message(message).is_some() => self.recorded += 1,
             _ => match AXES.iter().position(|axis| *axis == message) {

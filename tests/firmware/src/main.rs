@@ -51,7 +51,6 @@ const CHECKS: &[(&str, Check)] = &named! {
     temperature: follow_the_stage;
     motion: a_pose_has_its_instant;
     sensors: dead_from_the_start, transfers_that_never_end, a_register_changes_at_any_time;
-    log: a_debugger_reads_the_last_pose;
     timing: late_and_missed_ticks, a_watchdog_reset, the_clock_wraps, fpu_settings_left_behind,
         fpu_settings_changed_during_the_decoding, fpu_defaults_that_are_wrong;
     bus: received_frames_without_room, off_for_less_than_a_tick, goes_and_comes_back,

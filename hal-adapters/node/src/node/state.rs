@@ -11,11 +11,10 @@
 //! | 7 updating | 0: new parameters arrive or are stored; poses are invalid, and no frame comes for up to 0.55 s |
 //! | 8 stopped, until an activation or power-on | 1 the program faulted twice in its first second, 2 the record of the run before the reset is damaged, 3 the blob of that run is no longer in flash, 4 the program in flash differs from its check |
 
-use crate::records::Loaded;
 use crate::start_up::Stop;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::status::NodeState;
-use runtime::{OnInvalid, PoseTracker, RawFrame, Reading, Status};
+use runtime::{AnyDecoder, OnInvalid, PoseTracker, RawFrame, Reading, Status};
 
 /// First reason of [`NodeState::SensorFault`] for a code at a rail; its channel is added (0 to 2 Hall A to C, 3 to 5
 /// gaps 1 to 3). Reasons below: [`AdcError::number`].
@@ -51,16 +50,16 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// At start-up: the loaded parameters, the reason why a slot is refused, and the reason to stop. `is_sound`: the
+    /// At start-up: the decoder of the loaded parameters, the reason why a slot is refused, and the reason to stop. `is_sound`: the
     /// arithmetic equals the host's; else the node decodes nothing.
     pub fn at_start(
-        loaded: Option<Loaded>,
+        decoder: Option<AnyDecoder>,
         refusal: Option<u8>,
         stop: Option<Stop>,
         is_sound: bool,
     ) -> Self {
-        let servo = loaded.map(|loaded| PoseTracker::new(loaded.decoder, OnInvalid::Zero));
-        let servo = servo.filter(|_| is_sound && stop.is_none());
+        let decoder = decoder.filter(|_| is_sound && stop.is_none());
+        let servo = decoder.map(|decoder| PoseTracker::new(decoder, OnInvalid::Zero));
         let state = match (stop, refusal) {
             _ if !is_sound => (NodeState::SelfTestFailed, REASON_FPU),
             (Some(stop), _) => (NodeState::Stopped, stop as u8),

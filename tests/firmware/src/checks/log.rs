@@ -100,9 +100,3 @@ impl Stage {
         assert_eq!(self.pose, bench.pose(self.sequence.into()).words);
     }
 }
-
-/// What a debugger reads is the pose of the last tick.
-pub fn a_debugger_reads_the_last_pose(bench: &Bench) {
-    let machine = bench.running(321);
-    Stage::read(&machine).has_the_pose(bench, 319);
-}

@@ -94,11 +94,8 @@ pub fn parameters_change(bench: &Bench) {
         let wrong = wrong_valid(&seen.axes, &bench.poses, 1) as u64;
         println!("FAULT   a bit of parameters in RAM flips | {ticks} | {wrong}");
         assert!(ticks < 280 && wrong < 280);
-        let late: Vec<_> = seen
-            .axes
-            .into_iter()
-            .filter(|axis| axis.tick > reported)
-            .collect();
+        let mut late = seen.axes;
+        late.retain(|axis| axis.tick > reported);
         assert_eq!(wrong_valid(&late, &bench.poses, 1), 0);
         assert!(valid(&late) > 1000);
     }
@@ -110,16 +107,13 @@ fn constants(bench: &Bench, machine: &Machine) -> Vec<u32> {
         let size = f32::from_bits(*word).abs();
         word.trailing_zeros() < 8 && (1e-9..1e9).contains(&size) && !word.to_le_bytes().is_ascii()
     };
-    let words = bench
-        .blob
-        .windows(4)
-        .map(|w| u32::from_le_bytes(w.try_into().expect("four")));
+    let words = bench.blob.array_windows().map(|w| u32::from_le_bytes(*w));
     let words: Vec<_> = words.filter(is_number).collect();
     let statics = crate::image::RAM + bench.image.stack_bytes as u32;
-    let addresses = (statics..statics + bench.image.static_bytes as u32).step_by(4);
-    let found: Vec<_> = addresses
-        .filter(|at| words.contains(&machine.word(*at)))
+    let mut found: Vec<_> = (statics..statics + bench.image.static_bytes as u32)
+        .step_by(4)
         .collect();
+    found.retain(|at| words.contains(&machine.word(*at)));
     assert!(found.len() > 20, "only {} constants", found.len());
     found
 }
@@ -127,24 +121,19 @@ fn constants(bench: &Bench, machine: &Machine) -> Vec<u32> {
 /// Without a crystal the internal oscillator serves; flag, check and light show it. The crystal is absent,
 /// stops while the program runs (a restart), or the PLL does not lock to it (one reset by the watchdog).
 pub fn no_crystal(bench: &Bench) {
+    type Fault = fn(&mut Machine);
+    let absent: Fault = |m| m.chip.clocks.crystal = false;
+    let lost: Fault = |m| m.chip.stop_crystal();
+    let unlocked: Fault = |m| m.chip.clocks.pll = Pll::NotToCrystal;
     // Fault, start of it, the fault itself, its kind and step, resets by the program and by the watchdog.
-    type Case = (&'static str, u64, fn(&mut Machine), u32, (u32, u32));
-    let absent: fn(&mut Machine) = |m| m.chip.clocks.crystal = false;
-    let unlocked: fn(&mut Machine) = |m| m.chip.clocks.pll = Pll::NotToCrystal;
-    let cases: [Case; 3] = [
+    let cases = [
         ("crystal absent", 0, absent, 0, (0, 0)),
-        (
-            "crystal lost while running",
-            200_700_000,
-            |m| m.chip.stop_crystal(),
-            4,
-            (1, 0),
-        ),
+        ("crystal lost while running", 200_700_000, lost, 4, (1, 0)),
         (
             "PLL does not lock to the crystal",
             0,
             unlocked,
-            0x0105,
+            0x105,
             (0, 1),
         ),
     ];
@@ -206,22 +195,12 @@ pub fn pll_dead(bench: &Bench) {
 /// there and the light shows the fault, also without parameters.
 pub fn can_dead(bench: &Bench) {
     type Fault = fn(&mut Machine);
-    let faults: [(&str, Fault, &[u8]); 3] = [
-        (
-            "CAN does not start",
-            |m| m.chip.can.is_dead = true,
-            &bench.blob,
-        ),
-        (
-            "CAN receive line low",
-            |m| m.chip.can.held_low = true,
-            &bench.blob,
-        ),
-        (
-            "CAN receive line low, no parameters",
-            |m| m.chip.can.held_low = true,
-            &[],
-        ),
+    let dead: Fault = |m| m.chip.can.is_dead = true;
+    let low: Fault = |m| m.chip.can.held_low = true;
+    let faults = [
+        ("CAN does not start", dead, &bench.blob[..]),
+        ("CAN receive line low", low, &bench.blob),
+        ("CAN receive line low, no parameters", low, &[]),
     ];
     for (name, fault, blob) in faults {
         let mut machine = bench.machine([blob, &[]]);
@@ -269,15 +248,11 @@ pub fn crashes(bench: &Bench) {
     into_panic.extend((0..3).map(|k| (register::R0 + k, place)));
     let line = Some(image.word(place + 8));
     let below = stack - 0x1000..stack;
+    let (nowhere, overflow) = ((register::R0, NOWHERE), (register::SP, stack + 8));
+    let stacking = Some(ACCESS_AND_STACKING);
     for (fault, inject, kind, addresses, wanted) in [
-        ("hard fault", vec![(register::R0, NOWHERE)], 2, tick, None),
-        (
-            "stack overflow",
-            vec![(register::SP, stack + 8)],
-            3,
-            below,
-            Some(ACCESS_AND_STACKING),
-        ),
+        ("hard fault", vec![nowhere], 2, tick, None),
+        ("stack overflow", vec![overflow], 3, below, stacking),
         ("panic", into_panic, 1, place..place + 1, line),
     ] {
         let mut machine = bench.machine([&bench.blob, &[]]);

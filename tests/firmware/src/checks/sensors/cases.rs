@@ -107,6 +107,8 @@ impl Case {
 
 /// Every fault.
 pub fn cases() -> Vec<Case> {
+    let flipped = [fault(6), fault(5), SILENT];
+    let stopped = [NOT_READY, fault(5), fault(11)];
     let mut all = vec![
         Case::new("data line low", AdcFault::Line(0x00), &[SILENT]),
         Case::new("data line high", AdcFault::Line(0xff), &[SILENT]),
@@ -120,28 +122,26 @@ pub fn cases() -> Vec<Case> {
         Case::new(
             "a flipped bit in every frame",
             AdcFault::FlippedBit,
-            &[fault(6), fault(5), SILENT],
+            &flipped,
         ),
         Case {
             within: 2,
             ..Case::new("SYNC cut", AdcFault::Control, &[fault(10), fault(5)])
         },
-        Case::new(
-            "CLKIN stops",
-            AdcFault::Clock,
-            &[NOT_READY, fault(5), fault(11)],
-        ),
+        Case::new("CLKIN stops", AdcFault::Clock, &stopped),
         Case::new("DRDY cut", AdcFault::Ready, &[fault(11)]),
         Case::lost_setting("a short loss of power", Event::PowerLoss),
         Case::frozen("all codes frozen", AdcFault::Stuck, 0),
     ];
     for (k, sensor) in [(1, "Hall B"), (4, "gap 2")] {
-        all.push(Case::frozen(
-            &format!("{sensor} frozen"),
-            AdcFault::Frozen(k),
-            k,
-        ));
-        all.push(Case::open(&format!("{sensor} open, at its rail"), k));
+        let (frozen, open) = (
+            format!("{sensor} frozen"),
+            format!("{sensor} open, at its rail"),
+        );
+        all.extend([
+            Case::frozen(&frozen, AdcFault::Frozen(k), k),
+            Case::open(&open, k),
+        ]);
     }
     for (register, bits, name) in [
         (0x03, 1 << 2, "a bit of CLOCK flips"),
