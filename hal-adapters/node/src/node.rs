@@ -10,11 +10,10 @@ use crate::schedule::Period;
 use embedded_can::Frame;
 use hal_adapters::can::command::Content;
 use hal_adapters::can::sensor::{self, TemperatureSender};
-use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, bit, board_check, flag};
 use hal_adapters::can::table::{Message, SLOW_TICKS};
-use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
+use hal_adapters::can::update::{Identity, Nonce, Receiver, Store, Updates};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service};
 use runtime::tracker::Health;
 use runtime::zero_offset::ZeroOffsetSettings;
@@ -206,12 +205,12 @@ impl<'s> Node<'s> {
         nonce: Option<Nonce>,
     ) {
         let servo = self.parameters.servo.as_mut();
-        let updates = Updates {
+        let mut updates = Updates {
             receiver: &mut self.receiver,
             store,
             nonce,
         };
-        if let Some(Ok(answered)) = self.service.take(frame, servo, Some(updates))
+        if let Some(Ok(answered)) = self.service.take(frame, servo, Some(&mut updates))
             && let Some(answer) = answered.answer
         {
             outbox.push(answer);

@@ -25,10 +25,25 @@ use super::command::{Answer, Command, Content, Mailbox, Outcome, Request};
 use super::frame::Coded;
 use super::notice::BusFault;
 use super::status::flag;
-pub use super::update::Updates;
+use super::update::{UpdateData, UpdateRequest};
 use embedded_can::Frame;
 use runtime::zero_offset::{ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{Decode, PlanarPose, PoseTracker};
+
+/// The part of a node that takes new parameters: `update::Updates`, by the feature `update`.
+pub trait TakesUpdates {
+    /// Whether a tag must come before the command, and, if so, the answer unless it came.
+    fn authorise(&mut self, command: &Command) -> Option<Option<(Outcome, u32)>>;
+
+    /// Obeys a request, and gives outcome and detail of its answer.
+    fn obey(&mut self, token: u8, request: UpdateRequest, servo_off: bool) -> (Outcome, u32);
+
+    /// Notes the answer to a command that needs a tag.
+    fn note_answer(&mut self, command: &Command, answer: (Outcome, u32));
+
+    /// Takes a word of a tag or of parameters.
+    fn take(&mut self, data: &UpdateData);
+}
 
 /// A command that came, and its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,11 +104,15 @@ impl Service {
         &mut self,
         frame: &F,
         servo: Option<&mut PoseTracker<D>>,
-        mut updates: Option<Updates<'_, '_>>,
+        mut updates: Option<&mut dyn TakesUpdates>,
     ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
             Ok(Content::Command(command)) => {
-                let refusal = self.refusal(&command, updates.as_mut());
+                let authorised = match &mut updates {
+                    Some(updates) if command.needs_authority() => updates.authorise(&command),
+                    _ => None,
+                };
+                let refusal = self.refusal(&command, authorised);
                 let (outcome, detail) = match (refusal, command.request, &mut updates) {
                     (Some(refusal), ..) => refusal,
                     (None, Some(Request::Update(request)), Some(updates)) => {
@@ -110,7 +129,7 @@ impl Service {
                 Some(Ok(Answered { command, answer }))
             }
             Ok(Content::UpdateData(data)) => {
-                updates.as_mut()?.take(&data);
+                updates?.take(&data);
                 None
             }
             Ok(_) => None,
@@ -189,12 +208,11 @@ impl Service {
     fn refusal(
         &self,
         command: &Command,
-        updates: Option<&mut Updates<'_, '_>>,
+        authorised: Option<Option<(Outcome, u32)>>,
     ) -> Option<(Outcome, u32)> {
         if !command.needs_authority() {
             return None;
         }
-        let authorised = updates.and_then(|updates| updates.authorise(command));
         authorised.unwrap_or_else(|| {
             matches!(self.servo_off_pin, Some(false)).then_some((Outcome::ServoOn, 0))
         })

@@ -53,7 +53,7 @@ mod staging;
 mod store;
 #[cfg(feature = "update")]
 mod tell;
-#[cfg_attr(not(feature = "update"), path = "update/no_updates.rs")]
+#[cfg(feature = "update")]
 mod updates;
 
 #[cfg(feature = "update")]
@@ -67,4 +67,5 @@ pub use staging::{TAG_INDEX, blob_crc, word_at};
 pub use store::{BlobId, NotWritten, Running, Store};
 #[cfg(feature = "update")]
 pub use tell::{Identity, page};
+#[cfg(feature = "update")]
 pub use updates::Updates;

@@ -58,7 +58,7 @@ const CHECKS: &[(&str, Check)] = &named! {
     zero: over_resets, lost;
     start: supply_that_comes_late, slow_crystal, no_crystal, parameters_change, silent_after_bus_off, pll_dead, can_dead, the_board,
         crashes;
-    parameters: one_usable, unusable;
+    parameters: slots_in_every_state;
     commands: order_and_age, identify, any_length_code;
     update: new_parameters, refused, no_nonce_twice, hardware_that_fails, power_cuts;
     stopped: parameters_that_crash;

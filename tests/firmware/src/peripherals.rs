@@ -117,8 +117,7 @@ pub struct Peripherals {
     alarm_ns: Option<u64>,
     timer_flags: u32,
     timer_started_ns: Option<u64>,
-    /// Whether the converter was triggered since the alarm was set, and whether it had been before.
-    triggered: bool,
+    /// Whether the alarm is for the codes of a tick, not for its trigger.
     alarm_settles: bool,
     /// Whether a tick has come since the reset.
     ticked: bool,
@@ -166,7 +165,7 @@ impl Peripherals {
         self.reset_flags |= flags;
         (self.alarm_ns, self.timer_flags) = (None, 0);
         (self.timer_started_ns, self.captured_us) = (None, 0);
-        (self.triggered, self.alarm_settles, self.ticked) = (false, false, false);
+        (self.alarm_settles, self.ticked) = (false, false);
         (self.dma, self.transfer, self.overrun) = (Dma::default(), None, false);
         self.watchdog.reset();
         self.can.reset(self.now_ns);

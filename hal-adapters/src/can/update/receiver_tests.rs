@@ -1,9 +1,9 @@
 extern crate std;
 
-use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_at};
+use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, Updates, page, tag, word_at};
 use super::*;
 use crate::can::command::{Command, Content, Mailbox, Request};
-use crate::can::service::{Service, Updates};
+use crate::can::service::Service;
 use crate::can::{BusFrame, Coded, NodeNumber};
 use std::vec::Vec;
 
@@ -87,14 +87,14 @@ impl Bench {
     fn take(&mut self, frame: &BusFrame) -> Option<Coded> {
         self.nonce += 1;
         let nonce = [self.nonce; 4];
-        let updates = Updates {
+        let mut updates = Updates {
             receiver: &mut self.receiver,
             store: &mut self.store,
             nonce: Some(nonce),
         };
-        let taken = self
-            .service
-            .take(frame, None::<&mut runtime::PoseTracker>, Some(updates))?;
+        let taken =
+            self.service
+                .take(frame, None::<&mut runtime::PoseTracker>, Some(&mut updates))?;
         taken.ok()?.answer
     }
 

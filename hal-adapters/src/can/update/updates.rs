@@ -2,6 +2,7 @@
 
 use super::{Nonce, Receiver, Store, UpdateData, UpdateRequest};
 use crate::can::command::{Command, Outcome};
+use crate::can::service::TakesUpdates;
 
 /// What a node needs to take new parameters.
 pub struct Updates<'u, 's> {
@@ -13,29 +14,20 @@ pub struct Updates<'u, 's> {
     pub nonce: Option<Nonce>,
 }
 
-impl Updates<'_, '_> {
-    /// Whether a tag must come before the command, and, if so, the answer unless it came.
-    pub(in crate::can) fn authorise(
-        &mut self,
-        command: &Command,
-    ) -> Option<Option<(Outcome, u32)>> {
+impl TakesUpdates for Updates<'_, '_> {
+    fn authorise(&mut self, command: &Command) -> Option<Option<(Outcome, u32)>> {
         (self.receiver.has_key()).then(|| self.receiver.authorise(command).err())
     }
 
-    pub(in crate::can) fn obey(
-        &mut self,
-        token: u8,
-        request: UpdateRequest,
-        servo_is_off: bool,
-    ) -> (Outcome, u32) {
-        (self.receiver).obey(token, request, servo_is_off, self.nonce, &mut *self.store)
+    fn obey(&mut self, token: u8, request: UpdateRequest, servo_off: bool) -> (Outcome, u32) {
+        (self.receiver).obey(token, request, servo_off, self.nonce, &mut *self.store)
     }
 
-    pub(in crate::can) fn note_answer(&mut self, command: &Command, answer: (Outcome, u32)) {
+    fn note_answer(&mut self, command: &Command, answer: (Outcome, u32)) {
         self.receiver.note_answer(command, answer);
     }
 
-    pub(in crate::can) fn take(&mut self, data: &UpdateData) {
+    fn take(&mut self, data: &UpdateData) {
         self.receiver.take(data);
     }
 }

@@ -44,6 +44,9 @@ const SYNC_PIN: u32 = 0;
 const LED_PIN: u32 = 1;
 const SERVO_PIN: u32 = 1;
 
+/// From a trigger to the alarm for its codes, as it is set, us.
+const SETTLES_US: std::ops::RangeInclusive<u32> = 150..=207;
+
 /// Clock of the bus that SPI1 is on.
 const BUS_2_HZ: u64 = 84_000_000;
 /// Time of a read of a register that a program polls: loops that wait take time.
@@ -298,7 +301,7 @@ impl Peripherals {
         let left = compare.wrapping_sub(self.timer_us());
         let start = self.timer_started_ns.unwrap_or(self.now_ns);
         let us = (self.now_ns - start) / US + u64::from(left);
-        self.alarm_settles = std::mem::take(&mut self.triggered);
+        self.alarm_settles = SETTLES_US.contains(&left);
         let late_ns = i64::from(self.alarm_settles) * self.settled_jitter_ns;
         self.alarm_ns = (left > 0).then_some((start + us * US).saturating_add_signed(late_ns));
     }
@@ -345,10 +348,7 @@ impl Peripherals {
                     self.adc.select(self.now_ns);
                 }
             }
-            GPIOB => {
-                self.triggered |= !high;
-                self.adc.control(high, self.now_ns);
-            }
+            GPIOB => self.adc.control(high, self.now_ns),
             GPIOC => self.led = high,
             _ => {}
         }

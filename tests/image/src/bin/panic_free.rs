@@ -7,8 +7,9 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Content, Mailbox, Request};
-use hal_adapters::can::service::Updates;
-use hal_adapters::can::update::{BlobId, Identity, NotWritten, Receiver, Running, Store};
+use hal_adapters::can::update::{
+    BlobId, Identity, NotWritten, Receiver, Running, Store, Updates,
+};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
@@ -98,12 +99,12 @@ fn update(frame: &BusFrame) {
     };
     let (mut service, mut receiver) = (Service::new(500), Receiver::new(identity, 500));
     let store = &mut Nowhere;
-    let updates = Updates {
+    let mut updates = Updates {
         receiver: &mut receiver,
         store,
         nonce: black_box(Some([0; 4])),
     };
-    black_box(service.take(frame, None::<&mut PoseTracker>, Some(updates)));
+    black_box(service.take(frame, None::<&mut PoseTracker>, Some(&mut updates)));
     receiver.tick(service.servo_is_off());
     black_box(receiver.store(service.servo_is_off(), store));
     black_box((receiver.is_updating(), receiver.wants_reset()));
