@@ -108,11 +108,14 @@ impl Service {
     ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
             Ok(Content::Command(command)) => {
-                let authorised = match &mut updates {
-                    Some(updates) if command.needs_authority() => updates.authorise(&command),
-                    _ => None,
+                // For lack of a tag or, without a key, of a line that says "off"; or the first answer to a repeated command.
+                let line_is_on = matches!(self.servo_off_pin, Some(false));
+                let by_line = line_is_on.then_some((Outcome::ServoOn, 0));
+                let refusal = match &mut updates {
+                    _ if !command.needs_authority() => None,
+                    Some(updates) => updates.authorise(&command).unwrap_or(by_line),
+                    None => by_line,
                 };
-                let refusal = self.refusal(&command, authorised);
                 let (outcome, detail) = match (refusal, command.request, &mut updates) {
                     (Some(refusal), ..) => refusal,
                     (None, Some(Request::Update(request)), Some(updates)) => {
@@ -201,21 +204,6 @@ impl Service {
     /// Whether the zero and the parameters may be changed.
     pub const fn servo_is_off(&self) -> bool {
         self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
-    }
-
-    /// The answer to a command that must not be obeyed, for lack of a tag or, without a key, of a line that
-    /// says "off"; or the first answer to a repeated command.
-    fn refusal(
-        &self,
-        command: &Command,
-        authorised: Option<Option<(Outcome, u32)>>,
-    ) -> Option<(Outcome, u32)> {
-        if !command.needs_authority() {
-            return None;
-        }
-        authorised.unwrap_or_else(|| {
-            matches!(self.servo_off_pin, Some(false)).then_some((Outcome::ServoOn, 0))
-        })
     }
 
     fn obey<D: Decode>(
