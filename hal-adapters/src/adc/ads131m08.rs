@@ -80,11 +80,11 @@ mod timing;
 use super::channels::INPUTS;
 use super::thermometer::{AnalogInput, Held};
 use super::{AdcError, Channels, DataReady, FrameSampler, check_id, compare, silent};
+use conversions::Conversions;
 use crc::{CRC_16_IBM_3740, Crc};
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
-use timing::follow;
 
 /// Words of a frame: response, eight codes, check.
 const WORDS: usize = 2 + INPUTS;
@@ -324,13 +324,13 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
             MODE_REGISTER
         };
         let status_is_first = core::mem::take(&mut self.status_is_next);
-        let mut conversions = self.conversions();
+        let mut conversions = self.conversions().unwrap_or(Conversions::LOST);
 
         // Both carry conversions of the full store.
         let first = self.next_frame(READ | address(register), &mut conversions)?;
-        follow(&mut conversions, &first, true);
+        conversions.read(&first, true);
         let second = self.next_frame(NULL, &mut conversions)?;
-        follow(&mut conversions, &second, true);
+        conversions.read(&second, true);
         // A status reports each event once: every one of them counts.
         let mut statuses = 0;
         let mut status = Ok(());
@@ -343,11 +343,10 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> FrameSampler
             statuses |= frame.response;
             status = status.and(check_status(frame.response));
             ready = frame.response as u8 & read;
-            let number = follow(&mut conversions, &frame, ready == read);
-            let instant = conversions.zip(number);
-            let instant = instant.and_then(|(c, number)| self.instant_us(&c, number));
+            let number = conversions.read(&frame, ready == read);
+            let instant = number.and_then(|number| self.instant_us(&conversions, number));
             found = instant.map(|us| (us, frame.codes));
-            let in_vain = ready == read && conversions.is_none_or(|c| c.are_lost());
+            let in_vain = ready == read && conversions.is_lost;
             if found.is_some() || in_vain {
                 break;
             }

@@ -5,6 +5,8 @@
 //! conversions count as unknown, and a conversion that ends during a frame is only followed if the store had room for
 //! it either way.
 
+use super::Frame;
+
 /// Difference of two times of one event at most, us: a clock of 1 us, an edge and a frame by different hardware.
 const MARGIN_US: u32 = 3;
 /// A sample takes no longer, us.
@@ -23,7 +25,8 @@ pub(super) struct Conversions {
     unknown: u32,
     /// Stored conversions that are known, behind the unknown ones: the last ones before `next`.
     known: u32,
-    is_lost: bool,
+    /// Whether an event was not followed: no frame carries a known conversion any more.
+    pub(super) is_lost: bool,
 }
 
 impl Conversions {
@@ -39,15 +42,16 @@ impl Conversions {
         }
     }
 
+    /// Without an edge no conversion is known.
+    pub(super) const LOST: Self = Self {
+        is_lost: true,
+        ..Self::after(0, 0)
+    };
+
     /// When a conversion ends, us.
     pub(super) const fn end_us(&self, number: u32) -> u32 {
         let after_us = number.wrapping_mul(self.period_ns) / 1000;
         self.edge_us.wrapping_add(after_us)
-    }
-
-    /// Whether an event was not followed: no frame carries a known conversion any more.
-    pub(super) const fn are_lost(&self) -> bool {
-        self.is_lost
     }
 
     /// Until when a frame of `frame_us` that would begin at `now_us` has to wait, because a conversion would end during it
@@ -61,9 +65,10 @@ impl Conversions {
         meets.then(|| self.end_us(self.next).wrapping_add(MARGIN_US))
     }
 
-    /// The conversion that a frame from `from_us` to `to_us` carries, if it is known. `is_ready`: the frame says that it
+    /// The conversion that a frame carries, if it is known. `is_ready`: the frame says that it
     /// carries one.
-    pub(super) fn read(&mut self, from_us: u32, to_us: u32, is_ready: bool) -> Option<u32> {
+    pub(super) fn read(&mut self, frame: &Frame, is_ready: bool) -> Option<u32> {
+        let (from_us, to_us) = (frame.from_us, frame.to_us);
         self.store_until(from_us.wrapping_sub(MARGIN_US));
         let latest_us = to_us.wrapping_add(MARGIN_US);
         let is_empty = self.unknown + self.known == 0;

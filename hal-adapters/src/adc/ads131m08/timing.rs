@@ -96,13 +96,10 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
     pub(super) fn next_frame(
         &mut self,
         command: u16,
-        conversions: &mut Option<Conversions>,
+        conversions: &mut Conversions,
     ) -> Result<Frame, AdcError<SPI::Error>> {
         let now_us = self.ready.now_us();
-        let wait = conversions
-            .as_mut()
-            .and_then(|c| c.wait_until_us(now_us, self.frame_us));
-        if let Some(until_us) = wait {
+        if let Some(until_us) = conversions.wait_until_us(now_us, self.frame_us) {
             self.wait_us(until_us.wrapping_sub(now_us));
         }
         self.exchange(command, 0)
@@ -116,15 +113,4 @@ impl<SPI: SpiDevice, SYNC: OutputPin, READY: DataReady> Ads131m08<SPI, SYNC, REA
         let late_us = (self.period_ns / 2 * 3 + EDGE_LATE_NS) / 1000;
         is_settled.then(|| end_us.wrapping_sub(late_us))
     }
-}
-
-/// The conversion that a frame carries, if it is known.
-pub(super) fn follow(
-    conversions: &mut Option<Conversions>,
-    frame: &Frame,
-    is_ready: bool,
-) -> Option<u32> {
-    conversions
-        .as_mut()?
-        .read(frame.from_us, frame.to_us, is_ready)
 }
