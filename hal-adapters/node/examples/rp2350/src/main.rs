@@ -50,6 +50,7 @@ fn main() -> ! {
     let p = embassy_rp::init(embassy_rp::config::Config::default());
     let mut watchdog = Watchdog::new(p.WATCHDOG);
     let cause = match watchdog.reset_reason() {
+        // Or the pin RUN.
         None => Cause::PowerOn,
         Some(ResetReason::Forced) => Cause::Reset,
         Some(ResetReason::TimedOut) => Cause::Watchdog,
