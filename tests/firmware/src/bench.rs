@@ -5,13 +5,13 @@ use crate::adc_model::{Input, Row};
 use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
-use embedded_can::{Id, StandardId};
+use embedded_can::Frame;
 use hal_adapters::can::command::{Answer, Command, Outcome, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::pose::status_to_bus;
 use hal_adapters::can::sensor::read_temperature_mc;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
-use hal_adapters::can::{Layout, Message, NodeNumber};
+use hal_adapters::can::{BusFrame, Layout, Message, NodeNumber};
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Status};
 use std::ffi::OsString;
 use std::path::Path;
@@ -231,9 +231,8 @@ impl Seen {
     pub fn take(&mut self, sent: &Sent, first_ns: u64) {
         let since_ns = sent.asked_ns.saturating_sub(first_ns);
         let tick = since_ns / 2_000_000;
-        let id = StandardId::new(sent.id).map(Id::Standard);
-        let message = id.and_then(Message::from_id);
-        let read = message.and_then(|m| Some((m, unprotect(m.spec().key, &sent.bytes)?.1)));
+        let opened = Message::from_id(sent.frame.id).zip(sent.frame.data().first_chunk());
+        let read = opened.and_then(|(m, bytes)| Some((m, unprotect(m.key(), bytes)?.1)));
         let Some((message, payload)) = read else {
             self.damaged += 1;
             return;
@@ -305,9 +304,9 @@ impl Seen {
     }
 }
 
-/// The bytes of a command with its identifier; `counter` rises from command to command.
-pub fn command(request: Request, token: u8, counter: u8) -> (u16, [u8; 8]) {
+/// The frame of a command; `counter` rises from command to command.
+pub fn command(request: Request, token: u8, counter: u8) -> BusFrame {
     let payload = Command::new(request, token).payload();
-    let spec = Message::Command.spec();
-    (spec.id, protect(spec.key, counter, payload))
+    let bytes = protect(Message::Command.key(), counter, payload);
+    BusFrame::new(Message::Command.id(), &bytes).expect("eight bytes")
 }

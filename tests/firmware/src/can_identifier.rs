@@ -1,7 +1,6 @@
-//! Identifiers in the registers of bxCAN, and frames of a node with the identifiers of the table.
+//! Identifiers in the registers of bxCAN.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use hal_adapters::can::{BusFrame, NodeNumber};
+use embedded_can::{ExtendedId, Id, StandardId};
 
 /// IDE: the identifier has 29 bits, from bit 3 on, else eleven from bit 21 on (RM0090 32.9.3).
 pub const EXTENDED: u32 = 1 << 2;
@@ -15,20 +14,9 @@ pub fn to_register(id: Id) -> u32 {
 }
 
 /// The identifier in a register.
-fn from_register(bits: u32) -> Option<Id> {
+pub fn from_register(bits: u32) -> Option<Id> {
     match bits & EXTENDED {
         0 => StandardId::new((bits >> 21) as u16).map(Id::Standard),
         _ => ExtendedId::new(bits >> 3).map(Id::Extended),
-    }
-}
-
-/// A frame of a node with the identifier of the table. A foreign frame keeps its first eleven bits.
-pub fn from_bus(node: NodeNumber, register: u32, bytes: [u8; 8]) -> Option<(u16, [u8; 8])> {
-    let frame = BusFrame::new(from_register(register)?, &bytes)?;
-    let own = node.from_bus(&frame).unwrap_or(frame);
-    let bytes = own.data().try_into().ok()?;
-    match own.id {
-        Id::Standard(id) => Some((id.as_raw(), bytes)),
-        Id::Extended(id) => Some((id.standard_id().as_raw(), bytes)),
     }
 }

@@ -3,8 +3,8 @@
 
 mod registers;
 
-use crate::can_identifier::{EXTENDED, from_bus, to_register};
-use embedded_can::{Frame, StandardId};
+use crate::can_identifier::{EXTENDED, from_register, to_register};
+use embedded_can::Frame;
 use hal_adapters::can::{BusFrame, NodeNumber};
 use registers::{LATCH_OFF, RECOVER, TXRQ};
 use std::collections::VecDeque;
@@ -37,10 +37,8 @@ pub struct Sent {
     pub asked_ns: u64,
     /// When it was sent completely, ns.
     pub done_ns: u64,
-    /// Standard identifier.
-    pub id: u16,
-    /// Its bytes.
-    pub bytes: [u8; 8],
+    /// The frame, of the controller's node with the identifier of the table.
+    pub frame: BusFrame,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -164,34 +162,22 @@ impl CanModel {
         self.done |= (1 | u32::from(sent) << 1) << (8 * k);
     }
 
-    /// A frame from another node.
-    pub fn receive(&mut self, id: u16, bytes: [u8; 8]) {
-        self.receive_coded(id, 8, bytes);
+    /// A frame from another node to the controller's node.
+    pub fn receive(&mut self, frame: &BusFrame) {
+        self.receive_coded(frame, 8);
     }
 
-    /// A frame from another node, with any data length code: 9 to 15 mean eight bytes too.
-    pub fn receive_coded(&mut self, id: u16, length_code: u8, bytes: [u8; 8]) {
-        let frame = StandardId::new(id).and_then(|id| BusFrame::new(id, &bytes));
-        if let Some(frame) = frame.map(|frame| self.node.to_bus(&frame)) {
-            self.receive_frame(&frame, length_code);
-        }
-    }
-
-    /// A frame from another node.
-    pub fn receive_frame(&mut self, frame: &BusFrame, length_code: u8) {
+    /// The same with any data length code: 9 to 15 mean eight bytes too.
+    pub fn receive_coded(&mut self, frame: &BusFrame, length_code: u8) {
+        let frame = self.node.to_bus(frame);
         let id = to_register(frame.id);
-        let mut bytes = [0; 8];
-        bytes[..frame.data().len()].copy_from_slice(frame.data());
-        let [a, b, c, d, e, f, g, h] = bytes;
         if !self.passes(id) {
             return;
         }
         self.overrun |= self.received.len() == 3;
         if self.received.len() < 3 {
-            let (low, high) = (
-                u32::from_le_bytes([a, b, c, d]),
-                u32::from_le_bytes([e, f, g, h]),
-            );
+            let data = u64::from_le_bytes(frame.data().try_into().expect("eight bytes"));
+            let (low, high) = (data as u32, (data >> 32) as u32);
             self.received.push_back([id, length_code.into(), low, high]);
         }
     }
@@ -258,13 +244,13 @@ impl CanModel {
                     ..
                 } = self.mailboxes[k];
                 let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
-                self.sent
-                    .extend(from_bus(self.node, id, bytes).map(|(id, bytes)| Sent {
-                        asked_ns,
-                        done_ns: at,
-                        id,
-                        bytes,
-                    }));
+                let frame = from_register(id).and_then(|id| BusFrame::new(id, &bytes));
+                let frame = frame.expect("an identifier and eight bytes");
+                self.sent.push(Sent {
+                    asked_ns,
+                    done_ns: at,
+                    frame: self.node.from_bus(&frame).unwrap_or(frame),
+                });
                 self.complete(k, true);
             }
             self.arbitrate(at);

@@ -4,8 +4,6 @@
 use crate::adc_model::Input;
 use crate::bench::{Bench, rows};
 use crate::checks::update::{KEY, talk};
-use embedded_can::{Frame, StandardId};
-use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::Request;
 use hal_adapters::candump::LogLine;
 use std::fmt::Write as _;
@@ -43,11 +41,10 @@ pub fn record(bench: &Bench, log: &str, bus: &str, reference: &str) {
     for (k, sent) in machine.chip.can.sent.iter().enumerate() {
         // The computer looks at its clock up to 0.15 ms after the end of a frame.
         let us = sent.done_ns / 1000 + k as u64 * 7919 % 150;
-        let id = StandardId::new(sent.id).expect("of the table");
         let line = LogLine {
             time_us: BUS_CLOCK_S * 1_000_000 + us,
             interface: "can0",
-            frame: BusFrame::new(id, &sent.bytes).expect("eight bytes"),
+            frame: sent.frame,
         };
         let _ = writeln!(lines, "{line}");
     }

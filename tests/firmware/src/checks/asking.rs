@@ -21,8 +21,7 @@ pub(super) fn ask(machine: &mut Machine, request: Request, token: u8, ticks: u64
 
 /// Sends a request without a tag.
 pub(super) fn ask_untagged(machine: &mut Machine, request: Request, token: u8, ticks: u64) -> Seen {
-    let (id, bytes) = command(request, token, token);
-    machine.chip.can.receive(id, bytes);
+    (machine.chip.can).receive(&command(request, token, token));
     Seen::after(machine, ticks)
 }
 

@@ -87,8 +87,8 @@ pub fn aborted_on_the_wire(bench: &Bench) {
 pub fn an_answer_waits_alone(bench: &Bench) {
     let mut machine = bench.running(100);
     machine.chip.can.others_send = Some(Message::Answer.spec().id - 1);
-    let (id, bytes) = command(Request::Identify { seconds: 1 }, 7, 7);
-    machine.chip.can.receive(id, bytes);
+    let request = Request::Identify { seconds: 1 };
+    machine.chip.can.receive(&command(request, 7, 7));
     let held = Seen::after(&mut machine, 50);
     same_words(&held.axes, &bench.poses, 0, 49);
     assert_eq!(held.answers, []);
@@ -102,8 +102,8 @@ pub fn an_answer_waits_alone(bench: &Bench) {
 pub fn received_frames_without_room(bench: &Bench) {
     let mut machine = bench.running(100);
     for token in 0..5 {
-        let (id, bytes) = command(Request::Identify { seconds: 1 }, token, token);
-        machine.chip.can.receive(id, bytes);
+        let request = Request::Identify { seconds: 1 };
+        machine.chip.can.receive(&command(request, token, token));
     }
     machine.run_ticks(20);
     let counted = Stage::read(&machine).count("receive_overruns");

@@ -3,7 +3,6 @@
 use super::asking::ask;
 use super::no_resets;
 use crate::bench::{Bench, Seen, command};
-use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::flag;
 use hal_adapters::can::{Layout, Message as M};
@@ -52,8 +51,7 @@ pub fn order_and_age(bench: &Bench) {
     let mut ages: Vec<Option<(u64, u64)>> = vec![None; order.len()];
     let mut last = (0, 0);
     for sent in &machine.chip.can.sent {
-        let id = StandardId::new(sent.id).map(Id::Standard);
-        let message = id.and_then(M::from_id).expect("a foreign frame");
+        let message = M::from_id(sent.frame.id).expect("a foreign frame");
         let place = order.iter().position(|m| *m == message);
         let place = place.expect("a message that nobody asked for");
         let tick = (sent.asked_ns - first_ns) / 2_000_000;
@@ -81,8 +79,8 @@ pub fn order_and_age(bench: &Bench) {
 pub fn any_length_code(bench: &Bench) {
     let mut machine = bench.running(50);
     for code in 0..16 {
-        let (id, bytes) = command(Request::ClearZero, code, code);
-        machine.chip.can.receive_coded(id, code, bytes);
+        let frame = command(Request::ClearZero, code, code);
+        machine.chip.can.receive_coded(&frame, code);
         machine.run_ticks(20);
     }
     no_resets(&machine);

@@ -42,9 +42,9 @@ pub fn has_identifiers_and_a_period_of_its_own(bench: &Bench) {
 /// How often a request to a node is answered as done.
 fn identified(machine: &mut Machine, own: NodeNumber, to: NodeNumber) -> usize {
     let token = to.number() as u8;
-    let (id, bytes) = command(Request::Identify { seconds: 0 }, token, token);
+    let frame = command(Request::Identify { seconds: 0 }, token, token);
     machine.chip.can.node = to;
-    machine.chip.can.receive(id, bytes);
+    machine.chip.can.receive(&frame);
     machine.chip.can.node = own;
     machine.run_ns(20 * MS);
     let ended = Seen::since_last(machine).outcomes(token);

@@ -6,7 +6,6 @@ use super::same_words;
 use crate::bench::{Bench, Seen};
 use crate::flash_model::PowerCut;
 use crate::machine::Machine;
-use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::{NodeState, NodeStatus, board_check};
@@ -47,14 +46,7 @@ pub(crate) struct Wire<'m> {
 
 impl Link for Wire<'_> {
     fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
-        let data = frame
-            .data()
-            .try_into()
-            .map_err(|_| UpdateError::Link(String::new()))?;
-        let Id::Standard(id) = frame.id else {
-            return Err(UpdateError::Link(String::new()));
-        };
-        self.machine.chip.can.receive(id.as_raw(), data);
+        self.machine.chip.can.receive(&frame);
         Ok(())
     }
 
@@ -68,9 +60,7 @@ impl Link for Wire<'_> {
             let first_ns = self.machine.chip.first_tick_ns.unwrap_or(0);
             for sent in std::mem::take(&mut self.machine.chip.can.sent) {
                 self.seen.take(&sent, first_ns);
-                let id = StandardId::new(sent.id);
-                let frame = id.and_then(|id| BusFrame::new(id, &sent.bytes));
-                self.heard.extend(frame);
+                self.heard.push_back(sent.frame);
             }
         }
         Ok(self.heard.pop_front())
@@ -109,10 +99,7 @@ pub(super) fn updated(machine: &mut Machine, plan: &UpdateSettings) -> Updated {
 }
 
 pub(super) fn identity(machine: &mut Machine) -> Identity {
-    let (identity, _) = talk(machine, |talk| {
-        let identity = on::identify(talk)?;
-        Ok(identity)
-    });
+    let (identity, _) = talk(machine, |talk| on::identify(talk));
     identity.expect("an identity")
 }
 
