@@ -110,10 +110,7 @@ impl Command {
             Some(request) => request.in_frame().1,
             None => 0,
         };
-        Payload {
-            short: (self.token as u32) << 4 | (self.number & 0xf) as u32,
-            long,
-        }
+        Payload::new((self.token as u32) << 4 | (self.number & 0xf) as u32, long)
     }
 
     /// From the 52 bits of a frame.
@@ -217,10 +214,10 @@ impl Answer {
             Some(outcome) => outcome as u32,
             None => 0xff,
         };
-        Payload {
-            short: outcome << 12 | (self.token as u32) << 4 | (self.number & 0xf) as u32,
-            long: self.detail,
-        }
+        Payload::new(
+            outcome << 12 | (self.token as u32) << 4 | (self.number & 0xf) as u32,
+            self.detail,
+        )
     }
 
     /// From the 52 bits of a frame.

@@ -5,10 +5,7 @@ use proptest::prelude::*;
 #[test]
 fn a_request_worked_by_hand() {
     let command = Command::new(Request::Rezero { ticks: 500 }, 0xa7);
-    let payload = Payload {
-        short: 0xa71,
-        long: 500,
-    };
+    let payload = Payload::new(0xa71, 500);
     assert_eq!(command.payload(), payload);
     assert_eq!(Command::from_payload(payload), command);
 }

@@ -37,6 +37,13 @@ pub struct Payload {
     pub long: u32,
 }
 
+impl Payload {
+    /// From [`Payload::short`] and [`Payload::long`].
+    pub const fn new(short: u32, long: u32) -> Self {
+        Self { short, long }
+    }
+}
+
 /// Bits of [`Payload::short`].
 pub(super) const SHORT_BITS: u32 = 20;
 
@@ -107,10 +114,7 @@ pub const fn unprotect(key: u8, bytes: &[u8; 8]) -> Option<(u8, Payload)> {
     if check_byte(low, high, data_id(key, counter)) != low as u8 {
         return None;
     }
-    let payload = Payload {
-        short: low >> 12,
-        long: high,
-    };
+    let payload = Payload::new(low >> 12, high);
     Some((counter, payload))
 }
 

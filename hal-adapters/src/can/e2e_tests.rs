@@ -13,10 +13,7 @@ fn the_check_equals_profile_2() {
 #[test]
 fn a_frame_worked_by_hand() {
     // Payload short = 0xABCDE above counter 0x7 in bytes 1 to 3, long in bytes 4 to 7.
-    let payload = Payload {
-        short: 0xabcde,
-        long: 0x1234_5678,
-    };
+    let payload = Payload::new(0xabcde, 0x1234_5678);
     let bytes = protect(0x5a, 7, payload);
     assert_eq!(bytes[1..], [0xe7, 0xcd, 0xab, 0x78, 0x56, 0x34, 0x12]);
     let mut sent = [0; 8];

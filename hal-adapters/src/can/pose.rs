@@ -44,10 +44,7 @@ pub const fn status_to_bus(status: Status) -> u32 {
 const VERTICAL_SHIFT: u32 = 2;
 
 const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
-    let payload = Payload {
-        short: status_to_bus(status),
-        long: value.to_bits(),
-    };
+    let payload = Payload::new(status_to_bus(status), value.to_bits());
     Coded::new(message, counter, payload)
 }
 

@@ -41,10 +41,9 @@ impl Layout {
 
     /// The layout for a converter of `code_bits` bits.
     pub const fn from_bits(code_bits: u32) -> Self {
-        if code_bits <= 16 {
-            Self::Bits16
-        } else {
-            Self::Bits24
+        match code_bits {
+            0..=16 => Self::Bits16,
+            _ => Self::Bits24,
         }
     }
 
@@ -70,29 +69,22 @@ const fn fits(code: i32, bits: u32) -> bool {
 /// The bits of a code, and 0; or 0 bits, and 1 for a code that is missing or too wide.
 #[inline(always)]
 const fn coded(code: i32, bits: u32) -> (u32, u32) {
-    if fits(code, bits) {
-        (code as u32 & (u32::MAX >> (32 - bits)), 0)
-    } else {
-        (0, 1)
+    match fits(code, bits) {
+        true => (code as u32 & (u32::MAX >> (32 - bits)), 0),
+        false => (0, 1),
     }
 }
 
 #[inline(always)]
 const fn three_codes([a, b, c]: [i32; 3]) -> Payload {
     let ((a, no_a), (b, no_b), (c, no_c)) = (coded(a, 16), coded(b, 16), coded(c, 16));
-    Payload {
-        short: a << 4 | no_c << 2 | no_b << 1 | no_a,
-        long: c << 16 | b,
-    }
+    Payload::new(a << 4 | no_c << 2 | no_b << 1 | no_a, c << 16 | b)
 }
 
 #[inline(always)]
 const fn two_codes(a: i32, b: i32) -> Payload {
     let ((a, no_a), (b, no_b)) = (coded(a, 24), coded(b, 24));
-    Payload {
-        short: (a & 0xffff) << 4 | no_b << 1 | no_a,
-        long: b << 8 | a >> 16,
-    }
+    Payload::new((a & 0xffff) << 4 | no_b << 1 | no_a, b << 8 | a >> 16)
 }
 
 /// A code of `bits` bits in the low end of `word`, or [`MISSING_CODE`].
@@ -152,12 +144,8 @@ const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
 /// The frame with number and time of what was sampled; sent in every [`SLOW_TICKS`]th tick.
 pub(super) fn time_frame(message: Message, sampled: &RawFrame, tick: u32) -> Option<Coded> {
     let slow = u32::from(SLOW_TICKS);
-    let payload = Payload {
-        short: sampled.sequence,
-        long: sampled.time_us,
-    };
-    tick.is_multiple_of(slow)
-        .then(|| Coded::new(message, tick / slow, payload))
+    let payload = Payload::new(sampled.sequence, sampled.time_us);
+    (tick.is_multiple_of(slow)).then(|| Coded::new(message, tick / slow, payload))
 }
 
 /// From one frame of temperatures to the next while they stay the same, us.
@@ -196,10 +184,7 @@ impl TemperatureSender {
         let [mount_bits, body_bits] = TEMPERATURE_BITS;
         let ((mount, no_mount), (body, no_body)) =
             (coded(mount, mount_bits), coded(body, body_bits));
-        let payload = Payload {
-            short: mount,
-            long: no_body << 25 | no_mount << 24 | body,
-        };
+        let payload = Payload::new(mount, no_body << 25 | no_mount << 24 | body);
         Some(Coded::new(Message::Temperature, self.counter, payload))
     }
 }

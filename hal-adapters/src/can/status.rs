@@ -78,12 +78,10 @@ impl NodeStatus {
             Some(state) => state as u32,
             None => 15,
         };
-        Payload {
-            short: (self.flags as u32) << 12 | (self.reason as u32) << 4 | state,
-            long: (self.version as u32) << 24
-                | (self.bus_off as u32) << 16
-                | self.missed_ticks as u32,
-        }
+        Payload::new(
+            (self.flags as u32) << 12 | (self.reason as u32) << 4 | state,
+            (self.version as u32) << 24 | (self.bus_off as u32) << 16 | self.missed_ticks as u32,
+        )
     }
 
     /// From the 52 bits of a frame.
@@ -188,10 +186,7 @@ impl HealthPage {
 
     /// The 52 bits of the frame.
     pub const fn payload(&self) -> Payload {
-        Payload {
-            short: self.page as u32,
-            long: self.value,
-        }
+        Payload::new(self.page as u32, self.value)
     }
 
     /// From the 52 bits of a frame.
@@ -218,10 +213,7 @@ mod tests {
             bus_off: 5,
             version: 1,
         };
-        let want = Payload {
-            short: 0x2_1213,
-            long: 0x0105_1234,
-        };
+        let want = Payload::new(0x2_1213, 0x0105_1234);
         assert_eq!(status.payload(), want);
         assert_eq!(NodeStatus::from_payload(want), status);
     }

@@ -82,10 +82,7 @@ pub struct UpdateData {
 impl UpdateData {
     /// The 52 bits of the frame.
     pub const fn payload(&self) -> Payload {
-        Payload {
-            short: (self.index as u32) << 8 | self.token as u32,
-            long: self.word,
-        }
+        Payload::new((self.index as u32) << 8 | self.token as u32, self.word)
     }
 
     /// From the 52 bits of a frame.
