@@ -70,24 +70,20 @@ impl<'l> LogLine<'l> {
         let (Some(interface), Some(text)) = (parts.next(), parts.next()) else {
             return Err(broken(end, PARTS));
         };
-        if !text.contains('#') {
-            let frame = parse_screen(text, parts).ok_or_else(|| broken(text, SCREEN))??;
-            return Ok(Self {
-                time_us,
-                interface,
-                frame,
-            });
-        }
-        // A fourth part, R or T, is the direction (candump -x).
-        if let Some(rest) = parts.find(|part| !matches!(*part, "R" | "T")) {
-            return Err(broken(rest, PARTS));
-        }
-        let (id, data) = (text.split_once('#')).ok_or_else(|| broken(text, IDENTIFIER))?;
-        if data.starts_with('#') {
-            return Err(LineError::FlexibleDataRate);
-        }
-        let id = parse_id(id).ok_or_else(|| broken(text, IDENTIFIER))??;
-        let frame = parse_data(id, data).ok_or_else(|| broken(data, DATA))?;
+        let frame = match text.split_once('#') {
+            None => parse_screen(text, parts).ok_or_else(|| broken(text, SCREEN))??,
+            Some((id, data)) => {
+                // A fourth part, R or T, is the direction (candump -x).
+                if let Some(rest) = parts.find(|part| !matches!(*part, "R" | "T")) {
+                    return Err(broken(rest, PARTS));
+                }
+                if data.starts_with('#') {
+                    return Err(LineError::FlexibleDataRate);
+                }
+                let id = parse_id(id).ok_or_else(|| broken(text, IDENTIFIER))??;
+                parse_data(id, data).ok_or_else(|| broken(data, DATA))?
+            }
+        };
         Ok(Self {
             time_us,
             interface,

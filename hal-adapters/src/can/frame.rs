@@ -42,16 +42,20 @@ pub struct BusFrame {
 
 impl From<Coded> for BusFrame {
     fn from(coded: Coded) -> Self {
-        Self {
-            id: Id::Standard(coded.message.id()),
-            length: 8,
-            remote: false,
-            bytes: coded.bytes,
-        }
+        Self::data_frame(Id::Standard(coded.message.id()), 8, coded.bytes)
     }
 }
 
 impl BusFrame {
+    const fn data_frame(id: Id, length: u8, bytes: [u8; 8]) -> Self {
+        Self {
+            id,
+            length,
+            remote: false,
+            bytes,
+        }
+    }
+
     /// The same data under another identifier.
     pub(super) const fn with_id(&self, id: Id) -> Self {
         Self { id, ..*self }
@@ -64,10 +68,8 @@ impl BusFrame {
             *to = *from;
         }
         Self {
-            id: frame.id(),
-            length: frame.dlc().min(8) as u8,
             remote: frame.is_remote_frame(),
-            bytes,
+            ..Self::data_frame(frame.id(), frame.dlc().min(8) as u8, bytes)
         }
     }
 }
@@ -76,23 +78,13 @@ impl Frame for BusFrame {
     fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
         let mut bytes = [0; 8];
         bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(Self {
-            id: id.into(),
-            length: data.len() as u8,
-            remote: false,
-            bytes,
-        })
+        Some(Self::data_frame(id.into(), data.len() as u8, bytes))
     }
 
     fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
-        if dlc > 8 {
-            return None;
-        }
-        Some(Self {
-            id: id.into(),
-            length: dlc as u8,
+        (dlc <= 8).then(|| Self {
             remote: true,
-            bytes: [0; 8],
+            ..Self::data_frame(id.into(), dlc as u8, [0; 8])
         })
     }
 
