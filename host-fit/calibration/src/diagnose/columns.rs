@@ -5,7 +5,9 @@ use super::slopes::Slopes;
 use crate::judge::predicted::{cost, declared_service, service_range};
 use crate::judge::verdict::severity;
 use hallstage_input::channel::Channel;
-use hallstage_input::channels::{Column, NOISY, PROBES, SlowRate, USUAL_NOISE_M, probe_noise_m};
+use hallstage_input::channels::{
+    Column, Line, NOISY, PROBES, SlowRate, USUAL_NOISE_M, probe_noise_m,
+};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
 use hallstage_input::stage::Stage;
@@ -96,9 +98,8 @@ impl ColumnFaults {
                     let Some((mut found, bent, own)) = felt else {
                         continue;
                     };
-                    if let (Code::Outliers, Some((row, _))) =
-                        (found.code(), column.outliers.first())
-                    {
+                    let first = column.outliers.first();
+                    if let Some((row, _)) = first.filter(|_| found.code() == Code::Outliers) {
                         let row = &dataset.rows[source.rows.start + row];
                         let movement = &dataset.movements[row.movement];
                         found = found.with_place(dataset.movement_name(movement), row.t_us);
@@ -113,12 +114,17 @@ impl ColumnFaults {
                 stays = both(stays, beyond, |a, b| a + b);
                 let shared = kind.iter().map(|column| column.shared).fold(0.0, f64::max);
                 let is_new = shared > 0.0 || out.findings.len() == before;
-                if severity(cost(beyond)) > Severity::Note && is_new {
+                let is_felt = |variances| severity(cost(variances)) > Severity::Note;
+                if is_felt(beyond) && is_new {
                     let percent = 100.0 * shared;
-                    let found = Finding::new(Kind::GroupNoise { percent });
-                    let group = Channel::GROUPS[kind[0].channel as usize / 3];
-                    out.findings
-                        .push(found.with_channel(group).with_cost(cost(beyond)));
+                    let found = Finding::new(Kind::GroupNoise { percent }).with_cost(cost(beyond));
+                    let own_m2 = |k: usize| kind[k].beyond_m2[k];
+                    let own = |k: usize| effects.variances(&[channels[k]], |_, _| own_m2(k));
+                    let of = (0..3).filter(|k| shared == 0.0 && is_felt(own(*k)));
+                    let of: Vec<Channel> = of.map(|k| channels[k]).collect();
+                    let group = vec![Channel::GROUPS[channels[0] as usize / 3]];
+                    let channels = if of.is_empty() { group } else { of };
+                    out.findings.push(Finding { channels, ..found });
                 }
                 for found in &mut out.findings[before..] {
                     found.log = (dataset.logs.len() > 1).then(|| source.name());
@@ -166,10 +172,8 @@ impl PoseEffects {
         let mut sums = Vector3::zeros();
         for (i, a) in channels.iter().enumerate() {
             for (j, b) in channels.iter().enumerate() {
-                let products = self
-                    .0
-                    .iter()
-                    .map(|by| by[*a as usize].component_mul(&by[*b as usize]));
+                let products =
+                    (self.0.iter()).map(|by| by[*a as usize].component_mul(&by[*b as usize]));
                 sums += products.sum::<Vector3<f64>>() * (share * covariance(i, j));
             }
         }
@@ -212,15 +216,12 @@ fn faults(
     let noisy = |ratio: f64| {
         let noise_um = 1e6 * noise_m;
         let beyond_m2 = noise_m * noise_m * (1.0 - 1.0 / (ratio * ratio));
-        (
-            Kind::Noisy { noise_um, ratio },
-            Effect::Stays(beyond_m2, 0.0),
-        )
+        let kind = Kind::Noisy { noise_um, ratio };
+        (kind, Effect::Stays(beyond_m2, 0.0))
     };
     let own_m2 = column.beyond_m2[column.channel as usize % 3];
-    let line_m2 = column
-        .line
-        .map_or(0.0, |line| 0.5 * line.amplitude_m * line.amplitude_m);
+    let line_m2 = |line: Line| 0.5 * line.amplitude_m * line.amplitude_m;
+    let line_m2 = column.line.map_or(0.0, line_m2);
     // The steps of a bit are fast noise, too.
     let of_bits = Effect::Stays(stuck_m2, own_m2.clamp(0.0, stuck_m2));
     let in_service = |m2: f64| match is_beam {

@@ -67,7 +67,7 @@ pub fn remedy(found: &Finding) -> String {
         Kind::FasterLog { .. } => "the verdict is at best limited; for service that moves so, declare its motion in [motion], and apply the correction (runtime/README.md)",
         Kind::Resets { .. } => "log resets as movements",
         Kind::SingleRows { .. } => "check the movement column",
-        Kind::GroupNoise { .. } => "check what the channels share: supply, ground, converter, and magnetic fields nearby",
+        Kind::GroupNoise { percent } if *percent > 0.0 => "check what the channels share: supply, ground, converter, and magnetic fields nearby",
         Kind::RowsMissing { .. } => "look for frames that the recorder lost",
         Kind::OtherRate { .. } => "log every period, or correct servo.period_s",
         Kind::Stands { percent: 100.0, .. } => "is it connected?",

@@ -92,6 +92,17 @@ fn a_noisy_probe_costs_its_excess_over_its_siblings() {
     assert!(cost > Some(2.0), "{cost:?}");
 }
 
+#[test]
+fn noise_that_one_probe_has_at_times_is_not_that_of_all() {
+    let at_times = |k: usize, row: &mut Row| {
+        let deviation = if k % 500 < 100 { 16 } else { 0 };
+        row.frame.codes.hall[0] += random(row.t_us, deviation);
+    };
+    let (code, channel, cost) = only(at_times);
+    assert_eq!((code, channel), (Code::Noisy, Channel::HallA));
+    assert!(cost < Some(1.3), "{cost:?}");
+}
+
 /// Even numbers with this deviation, by the time.
 fn random(t_us: i64, deviation: i32) -> i32 {
     let mixed = (t_us as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);

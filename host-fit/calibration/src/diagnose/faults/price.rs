@@ -203,7 +203,10 @@ impl Finder<'_> {
         let judged = judged.with_added(drifts);
         let unexplained = variances(&off_by(&by_motion));
         let unexplained = [0, 1, 2].map(|axis| slow[axis] + unexplained[axis]);
-        let first = by_motion.first().map(|&number| &faults[number]);
+        // A cause explains most of the misfit.
+        let most = 0.5 * (faultless.chi_squared / self.means.freedom() - 1.0).max(0.0);
+        let first = by_motion.first().filter(|_| inflation - 1.0 <= most);
+        let first = first.map(|&number| &faults[number]);
         if by.is_for_service {
             findings.extend(unexplained_finding([unexplained, drifts], first, &judged));
         }

@@ -33,6 +33,21 @@ fn no_finding_hides_an_error_that_stays_in_service() {
     }
 }
 
+/// The sagging supply of all probes, which the search finds, explains 3 % of the misfit by this waviness of Hall A.
+#[test]
+fn what_explains_a_small_part_of_the_misfit_is_not_named() {
+    let codes = 1e-6 / stage().hall.m_per_count;
+    let mut wavy = recording(2000);
+    for sample in wavy.movements.iter_mut().flatten() {
+        let turn = std::f64::consts::TAU * f64::from(sample.hall[0]) / 8192.0;
+        sample.hall[0] += (codes * turn.sin()).round() as i32;
+    }
+    let findings = diagnosed(wavy, |_, _| {}).findings;
+    let lacks = |found: &&Finding| found.code() == Code::ModelLacks;
+    let found = findings.iter().find(lacks).expect("a finding");
+    assert_eq!(found.channels, []);
+}
+
 /// Beam Y2 is written in steps of 10 um.
 #[test]
 fn a_rough_reference_does_not_raise_the_noise_floor() {
