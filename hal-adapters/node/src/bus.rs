@@ -90,7 +90,7 @@ impl<C: Can> Bus<C> {
             bus_off: 0,
             sent: 0,
             overruns: 0,
-            outbox: Outbox::new(),
+            outbox: Outbox::default(),
         }
     }
 

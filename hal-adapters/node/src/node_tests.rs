@@ -21,7 +21,7 @@ fn loaded() -> AnyDecoder {
 fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Outcome> {
     let command = Content::Command(Command::new(request, token));
     let frame = BusFrame::from(Mailbox::default().send(&command).expect("a frame"));
-    let mut outbox = Outbox::new();
+    let mut outbox = Outbox::default();
     let (mut records, _) = Records::start(slots(FlashModel::erased()), Choice::Newest, None);
     node.take(&frame, &mut outbox, &mut records, None);
     let mut host = Mailbox::default();
@@ -53,7 +53,7 @@ fn without_a_key_the_servo_counts_as_on_unless_the_line_says_off() {
             ..Facts::default()
         };
         let frame = RawFrame::new([100, 200, 300], [10, 20, 30], 0, 0);
-        node.tick(Ok(frame), &facts, &mut Outbox::new());
+        node.tick(Ok(frame), &facts, &mut Outbox::default());
         ask(&mut node, Request::ServoOff { seconds: 9 }, 1);
         assert_eq!(ask(&mut node, Request::ClearZero, 2), [outcome], "{line:?}");
     }

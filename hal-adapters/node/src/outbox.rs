@@ -28,16 +28,6 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// An empty box.
-    pub const fn new() -> Self {
-        Self {
-            fresh: Deque::new(),
-            lasting: Deque::new(),
-            answers: false,
-            dropped: 0,
-        }
-    }
-
     /// Adds a frame at the end. Only an answer is still worth sending after its tick.
     pub fn push(&mut self, frame: Coded) {
         let full = match frame.message {
@@ -117,7 +107,7 @@ mod tests {
 
     #[test]
     fn frames_left_over_and_frames_too_many_are_counted() {
-        let mut outbox = Outbox::new();
+        let mut outbox = Outbox::default();
         (0..FRESH_MAX + 2).for_each(|_| outbox.push(frame(Message::PoseX)));
         assert_eq!(outbox.dropped, 2);
         assert_eq!(outbox.pop(), Some(frame(Message::PoseX)));
@@ -128,7 +118,7 @@ mod tests {
 
     #[test]
     fn an_answer_gives_way_to_the_next_pose_and_goes_again_until_it_is_sent() {
-        let mut outbox = Outbox::new();
+        let mut outbox = Outbox::default();
         let next = |outbox: &mut Outbox, is_sent| {
             let message = outbox.front(true).map(|frame| frame.message);
             if message.is_some() {

@@ -174,12 +174,6 @@ pub struct Sequence {
 /// Stands for no counter.
 const NO_COUNTER: u8 = 0xff;
 
-impl Default for Sequence {
-    fn default() -> Self {
-        Self::START
-    }
-}
-
 impl Sequence {
     /// Before the first frame.
     pub const START: Self = Self {

@@ -15,9 +15,9 @@ use runtime::zero_offset::ZeroOffsetSettings;
 use stage_node::node::Settings;
 use stage_node::schedule::Period;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
-use stm32f4xx_hal::pac::{CAN1, DMA2, GPIOA, GPIOB, GPIOC, SPI1};
+use stm32f4xx_hal::pac::{DMA2, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
+use stm32f4xx_hal::rcc::{Config, Rcc};
 use stm32f4xx_hal::time::Hertz;
 
 /// The converter: any part with a driver that implements [`FrameSampler`].
@@ -178,8 +178,6 @@ const fn number(text: &str) -> u32 {
 pub struct Parts {
     /// The converter, not started yet.
     pub converter: Converter,
-    /// The CAN controller, switched on but not set up yet.
-    pub can: CAN1,
     /// The LED.
     pub led: Led,
     /// Whether the servo is off.
@@ -192,12 +190,10 @@ pub struct Parts {
 /// Time for a line to follow the internal resistor of 30 to 50 kOhm, us: three time constants with 50 pF.
 const PULL_US: u32 = 8;
 
-/// Sets the pins up.
+/// Sets the pins up. The clock must run.
 pub fn set_up(
     (gpioa, gpiob, gpioc): (GPIOA, GPIOB, GPIOC),
     (spi1, dma2): (SPI1, DMA2),
-    can1: CAN1,
-    ready: ReadyLine,
     rcc: &mut Rcc,
 ) -> Parts {
     let (gpioa, gpiob, gpioc) = (gpioa.split(rcc), gpiob.split(rcc), gpioc.split(rcc));
@@ -236,11 +232,8 @@ pub fn set_up(
         .set_internal_resistor(Pull::Up);
     // At the lowest speed an edge takes 100 ns of a bit of 1000 (DS8626, I/O AC characteristics).
     gpiob.pb9.into_alternate::<9>().set_speed(Speed::High);
-    CAN1::enable(rcc);
-    CAN1::reset(rcc);
     Parts {
-        converter: Converter::new(spi, control, ready, CHANNELS),
-        can: can1,
+        converter: Converter::new(spi, control, ReadyLine::default(), CHANNELS),
         led: gpioc.pc1.into_push_pull_output(),
         servo: gpiob.pb1.into_pull_up_input(),
         not_pulled_up,

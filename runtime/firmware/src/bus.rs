@@ -3,42 +3,41 @@
 use crate::board;
 use crate::wait::Stopwatch;
 use embedded_can::{Frame, StandardId};
-use hal_adapters::can::{BusFrame, Coded, Message, NodeNumber};
+use hal_adapters::can::{BusFrame, Coded, Message};
 use stage_node::bus::{Can, CanState, Mailboxes};
 use stm32f4xx_hal::pac::CAN1;
 use stm32f4xx_hal::pac::can1::TX;
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 /// Longest wait for the controller to stand still, us. It takes a few bits.
 const INIT_US: u32 = 1000;
 /// IDE in a mailbox's identifier register and in a filter: the identifier has 29 bits. The eleven bits of the table come
 /// first, in the place of a standard identifier (RM0090 rev. 18, 32.9.3 and 32.9.4).
 const EXTENDED: u32 = 1 << 2;
-/// Bits of TSR for mailbox 0; the bits of the next mailboxes follow after eight bits each.
-const REQUEST_COMPLETED: u32 = 1;
-const SENT: u32 = 1 << 1;
-const ABORT: u32 = 1 << 7;
-/// Bit of TSR: mailbox 0 is empty; the bits of the next mailboxes follow.
-const EMPTY: u32 = 1 << 26;
+/// The bits of an identifier register that the node's number sets.
+const NODE_BITS: u32 = match board::STAGE_NODE.number() {
+    0 => 0,
+    number => number << 3 | EXTENDED,
+};
+/// Bits of TSR for all three mailboxes (32.9.2): request completed; request to abort; empty. TXOK is the bit above the first.
+const COMPLETED: u32 = 0x01_01_01;
+const ABORT: u32 = 0x80_80_80;
+const EMPTY: u32 = 0b111 << 26;
 
 /// The controller.
 pub struct BxCan {
     can: CAN1,
-    /// The bits of an identifier register that the node's number sets.
-    node_bits: u32,
     is_started: bool,
 }
 
 impl BxCan {
-    /// Sets the controller up to join the bus by itself and to receive commands only. The
-    /// controller must have been switched on and reset.
+    /// Sets the controller up to join the bus by itself and to receive commands only.
     ///
     /// By a crystal it recovers from bus-off by itself. The internal oscillator may be too inexact
     /// for a bus: then the controller's errors end in bus-off, and it stays silent.
-    pub fn new(can: CAN1, node: NodeNumber, crystal: bool, stopwatch: &mut Stopwatch) -> Self {
-        let node_bits = match node.number() {
-            0 => 0,
-            number => number << 3 | EXTENDED,
-        };
+    pub fn new(can: CAN1, rcc: &mut Rcc, crystal: bool, stopwatch: &mut Stopwatch) -> Self {
+        CAN1::enable(rcc);
+        CAN1::reset(rcc);
         can.mcr()
             .modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
         let is_started = stopwatch.until(board::CORE_HZ / 1_000_000, INIT_US, || {
@@ -54,75 +53,46 @@ impl BxCan {
                 w.ts2().bits(segment_2 - 1);
                 w.sjw().bits(jump - 1)
             });
-            receive_commands_only(&can, node_bits);
+            receive_commands_only(&can);
             // BOFIE lets ERRI latch a bus-off; ERRIE, which would make it an interrupt, is off.
             can.ier().write(|w| w.tmeie().set_bit().bofie().set_bit());
             can.mcr()
                 .modify(|_, w| w.abom().bit(crystal).inrq().clear_bit());
         }
-        Self {
-            can,
-            node_bits,
-            is_started,
-        }
-    }
-
-    /// TSR, with the bits of a mailbox `k` shifted by 8 `k`, and whether mailbox `k` is empty.
-    fn mailbox(status: u32, k: u32) -> (u32, bool) {
-        (status >> (8 * k), status & EMPTY << k != 0)
+        Self { can, is_started }
     }
 }
 
 impl Can for BxCan {
     fn take_back(&mut self) {
-        let status = self.can.tsr().read().bits();
-        let pending = (0..3).filter(|&k| !Self::mailbox(status, k).1);
-        let aborts = pending.fold(0, |bits, k| bits | ABORT << (8 * k));
-        // SAFETY: bits that the controller defines; zeros change nothing.
-        self.can.tsr().write(|w| unsafe { w.bits(aborts) });
+        // SAFETY: bits that the controller defines. They change nothing in an empty mailbox.
+        self.can.tsr().write(|w| unsafe { w.bits(ABORT) });
     }
 
     fn mailboxes(&mut self) -> Mailboxes {
         let status = self.can.tsr().read().bits();
-        let mut found = Mailboxes {
-            sent: 0,
-            given_up: 0,
-            are_empty: true,
-        };
-        let mut completed = 0;
-        for k in 0..3 {
-            let (bits, is_empty) = Self::mailbox(status, k);
-            found.are_empty &= is_empty;
-            if bits & REQUEST_COMPLETED != 0 {
-                completed |= REQUEST_COMPLETED << (8 * k);
-                // Only a request that was aborted ends without a frame.
-                let ended = match bits & SENT {
-                    0 => &mut found.given_up,
-                    _ => &mut found.sent,
-                };
-                *ended += 1;
-            }
-        }
+        let completed = status & COMPLETED;
         if completed != 0 {
             // Ends their interrupt. SAFETY: bits that the controller defines; zeros change nothing.
             self.can.tsr().write(|w| unsafe { w.bits(completed) });
         }
-        found
+        // Only a request that was aborted ends without a frame.
+        let sent = status >> 1 & completed;
+        Mailboxes {
+            sent: sent.count_ones(),
+            given_up: (completed & !sent).count_ones(),
+            are_empty: status & EMPTY == EMPTY,
+        }
     }
 
     fn put(&mut self, frame: &Coded) -> bool {
         let (state, status) = (self.can.msr().read(), self.can.tsr().read().bits());
         let is_apart = state.inak().bit_is_set() || state.slak().bit_is_set();
-        let reported = (0..3).position(|k| {
-            let (bits, is_empty) = Self::mailbox(status, k);
-            is_empty && bits & REQUEST_COMPLETED == 0
-        });
-        let mailbox = reported.and_then(|k| self.can.tx_iter().nth(k));
-        match mailbox.filter(|_| self.is_started && !is_apart) {
-            Some(mailbox) => fill(mailbox, frame, self.node_bits),
-            None => return false,
-        }
-        true
+        // Empty, and reported as such.
+        let is_free = |k: &usize| status >> (26 + k) & 1 == 1 && status >> (8 * k) & 1 == 0;
+        let mailbox = (0..3).find(is_free).and_then(|k| self.can.tx_iter().nth(k));
+        let mailbox = mailbox.filter(|_| self.is_started && !is_apart);
+        mailbox.map(|mailbox| fill(mailbox, frame)).is_some()
     }
 
     fn receive(&mut self) -> Option<BusFrame> {
@@ -164,10 +134,10 @@ impl Can for BxCan {
 
 /// Lets data frames of two identifiers into the first store, and no others: the command's and that
 /// of new parameters.
-fn receive_commands_only(can: &CAN1, node_bits: u32) {
+fn receive_commands_only(can: &CAN1) {
     // Remote frames have a bit that is 0 in these words.
     let [command, data] = [Message::Command, Message::UpdateData]
-        .map(|message| u32::from(message.id().as_raw()) << 21 | node_bits);
+        .map(|message| u32::from(message.id().as_raw()) << 21 | NODE_BITS);
     can.fmr().modify(|_, w| w.finit().set_bit());
     can.fa1r().write(|w| w.fact0().clear_bit());
     // A list of two identifiers of 32 bits.
@@ -184,7 +154,7 @@ fn receive_commands_only(can: &CAN1, node_bits: u32) {
     can.fmr().modify(|_, w| w.finit().clear_bit());
 }
 
-fn fill(mailbox: &TX, frame: &Coded, node_bits: u32) {
+fn fill(mailbox: &TX, frame: &Coded) {
     let [a, b, c, d, e, f, g, h] = frame.bytes;
     let (low, high) = (
         u32::from_le_bytes([a, b, c, d]),
@@ -196,7 +166,7 @@ fn fill(mailbox: &TX, frame: &Coded, node_bits: u32) {
         mailbox.tdlr().write(|w| w.bits(low));
         mailbox.tdhr().write(|w| w.bits(high));
     }
-    let id = u32::from(frame.message.id().as_raw()) << 21 | node_bits;
+    let id = u32::from(frame.message.id().as_raw()) << 21 | NODE_BITS;
     // SAFETY: identifier and IDE; TXRQ is set besides.
     mailbox
         .tir()

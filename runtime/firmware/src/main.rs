@@ -75,9 +75,8 @@ mod app {
         let serial = (device.SPI1, device.DMA2);
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
-        let ready = clock.data_ready();
-        let pins = board::set_up(ports, serial, device.CAN1, ready, &mut rcc);
-        let can = BxCan::new(pins.can, board::STAGE_NODE, crystal, &mut stopwatch);
+        let pins = board::set_up(ports, serial, &mut rcc);
+        let can = BxCan::new(device.CAN1, &mut rcc, crystal, &mut stopwatch);
         let options = device.FLASH.optcr().read().bits();
         let checks =
             pins.not_pulled_up | seal::checks() | bit(board_check::INTERNAL_OSCILLATOR, !crystal);

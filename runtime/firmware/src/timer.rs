@@ -27,11 +27,6 @@ impl Clock {
         Self { timer }
     }
 
-    /// The line at channel 3.
-    pub fn data_ready(&self) -> ReadyLine {
-        ReadyLine { seen_us: 0 }
-    }
-
     /// Sets the alarm off at `due_us`; at once, if that is past.
     pub fn set_alarm(&mut self, due_us: u32) {
         self.timer.ccr(0).write(|w| w.ccr().set(due_us));
@@ -51,6 +46,7 @@ impl Clock {
 }
 
 /// The data-ready line of the converter, at channel 3 of the running clock.
+#[derive(Default)]
 pub struct ReadyLine {
     seen_us: u32,
 }
