@@ -54,9 +54,9 @@ const fn address(offset: u32) -> *mut u8 {
 }
 
 impl Sectors {
-    /// Opens FLASH_CR, does an operation, and locks it again. The operation gives the number of
-    /// looks until it is given up. It sets PSIZE to x32, which needs at least 2.7 V (table 13).
-    fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), NorFlashErrorKind> {
+    /// Opens FLASH_CR, does an operation of at most so many looks, and locks it again. The operation sets PSIZE to x32,
+    /// which needs at least 2.7 V (table 13).
+    fn operate(&mut self, looks: u32, start: impl FnOnce(&FLASH)) -> Result<(), NorFlashErrorKind> {
         let Self(registers) = self;
         if registers.cr().read().lock().bit_is_set() {
             for key in KEYS {
@@ -66,14 +66,11 @@ impl Sectors {
         }
         // SAFETY: bits that are cleared by writing 1.
         registers.sr().write(|w| unsafe { w.bits(END | ERRORS) });
-        let mut looks = start(registers);
+        start(registers);
         // Reads come after the operation.
         asm::dsb();
-        let mut status = registers.sr().read().bits();
-        while status & BUSY != 0 && looks > 0 {
-            status = registers.sr().read().bits();
-            looks -= 1;
-        }
+        let mut statuses = (0..looks).map(|_| registers.sr().read().bits());
+        let ended = statuses.find(|status| status & BUSY == 0);
         registers.cr().modify(|_, w| {
             w.pg().clear_bit().ser().clear_bit();
             w.lock().set_bit()
@@ -84,8 +81,8 @@ impl Sectors {
         registers.acr().modify(|_, w| w.dcrst().set_bit());
         registers.acr().modify(|_, w| w.dcrst().clear_bit());
         registers.acr().modify(|_, w| w.dcen().set_bit());
-        match status & (BUSY | ERRORS) {
-            0 => Ok(()),
+        match ended {
+            Some(status) if status & ERRORS == 0 => Ok(()),
             _ => Err(NorFlashErrorKind::Other),
         }
     }
@@ -120,12 +117,11 @@ impl NorFlash for Sectors {
         check_write(self, offset, bytes.len())?;
         let (words, _) = bytes.as_chunks();
         for (word, at) in words.iter().zip((offset..).step_by(4)) {
-            self.operate(|registers| {
+            self.operate(WORD_LOOKS, |registers| {
                 (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
                 // SAFETY: within the sectors, which the linker's script aligns to words. A write to flash
                 // programs it while PG is set (section 3.6.4).
                 unsafe { (address(at).cast::<u32>()).write_volatile(u32::from_le_bytes(*word)) };
-                WORD_LOOKS
             })?;
         }
         Ok(())
@@ -135,14 +131,13 @@ impl NorFlash for Sectors {
         check_erase(self, from, to)?;
         for offset in (from..to).step_by(SECTOR_BYTES) {
             let sector = (address(offset) as u32 - FIRST) / SECTOR_BYTES as u32;
-            self.operate(|registers| {
+            self.operate(SECTOR_LOOKS, |registers| {
                 // SAFETY: the number of a sector, 1 to 3: `memory.x` links with no other slots.
                 registers.cr().modify(|_, w| unsafe {
                     w.psize().psize32().ser().set_bit();
                     w.snb().bits(sector as u8)
                 });
                 registers.cr().modify(|_, w| w.strt().set_bit());
-                SECTOR_LOOKS
             })?;
         }
         Ok(())

@@ -6,7 +6,7 @@
 //! - Two interrupts have the same priority, so shared state needs no lock. RTIC checks this at compile time:
 //!   state moves from `init` into the tasks that use it, without `unsafe` and without cells.
 //! - TIM2 gives the ticks on an absolute schedule. A tick triggers the converter and is
-//!   finished by a second alarm when the codes have settled; it does not wait in between.
+//!   finished by the next alarm when the codes have settled; it does not wait in between.
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
 //! - A panic, a fault of the core, a stack overflow, a crystal that stops and parameters that change in RAM are noted

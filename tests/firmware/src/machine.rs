@@ -291,7 +291,7 @@ fn waits_at(image: &Image) -> u32 {
 
 /// What a callback is given. It is leaked, so that it lives as long as the emulator.
 fn context(core: &Unicorn, chip: &mut Peripherals, start: u64) -> *mut c_void {
-    let (stop, write) = (core.stopper(), core.writer());
+    let (stop, write) = (core.stop, core.write);
     let context = Context {
         chip,
         start,

@@ -75,11 +75,13 @@ pub struct Unicorn {
     handle: Handle,
     close: Close,
     read: Register,
-    write: Register,
+    /// Sets a register, also from within a callback.
+    pub write: Register,
     map_pointer: MapPointer,
     map_io: MapIo,
     start: Start,
-    stop: Stop,
+    /// Ends a run from within a callback.
+    pub stop: Stop,
     hook_add: HookAdd,
     _library: Library,
 }
@@ -201,16 +203,6 @@ impl Unicorn {
             0 => Ok(()),
             fault => Err(fault),
         }
-    }
-
-    /// Ends a run from within a callback.
-    pub fn stopper(&self) -> Stop {
-        self.stop
-    }
-
-    /// Sets a register from within a callback.
-    pub fn writer(&self) -> Register {
-        self.write
     }
 }
 

@@ -2,19 +2,12 @@
 //! 3.3 V, on the stage body a TI TMP235.
 
 /// Rows of the 103AT-2's sheet (Semitec P12-13): degC, Ohm.
-const THERMISTOR: [(f64, f64); 10] = [
-    (0.0, 27_280.0),
-    (5.0, 22_050.0),
-    (10.0, 17_960.0),
-    (15.0, 14_690.0),
+const THERMISTOR: [(f64, f64); 4] = [
     (20.0, 12_090.0),
     (25.0, 10_000.0),
     (30.0, 8_313.0),
     (35.0, 6_940.0),
-    (40.0, 5_827.0),
-    (45.0, 4_911.0),
 ];
-
 const SUPPLY_V: f64 = 3.3;
 const SERIES_OHM: f64 = 68e3;
 
@@ -49,13 +42,8 @@ impl Default for Thermometers {
 
 /// Between two rows ln R is a line in 1/T, which is what a B value says.
 fn thermistor_ohm(celsius: f64) -> f64 {
-    let rows = THERMISTOR
-        .windows(2)
-        .filter_map(|pair| pair.first().zip(pair.last()));
-    let mut rows = rows.filter(|(low, high)| (low.0..=high.0).contains(&celsius));
-    let Some(((t0, r0), (t1, r1))) = rows.next() else {
-        return f64::NAN;
-    };
+    let mut rows = THERMISTOR.array_windows();
+    let [(t0, r0), (t1, r1)] = rows.find(|[_, high]| celsius <= high.0).expect("a row");
     let inverse = |t: f64| 1.0 / (t + 273.15);
     let part = (inverse(celsius) - inverse(*t0)) / (inverse(*t1) - inverse(*t0));
     r0 * (r1 / r0).powf(part)
