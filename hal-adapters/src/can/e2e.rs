@@ -26,6 +26,7 @@
 
 use super::notice::{BusFault, open};
 use super::table::Message;
+use crc::{CRC_8_AUTOSAR, Crc};
 
 /// The 52 bits of a protected frame besides check and counter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,25 +54,7 @@ pub const BASE_LIST: [u8; 16] = [
 ];
 
 /// CRC-8 with polynomial 0x2F: the register after eight bits, for each value before them.
-const TABLE: [u8; 256] = {
-    let mut table = [0; 256];
-    let mut value = 0;
-    while value < 256 {
-        let mut register = value as u8;
-        let mut bit = 0;
-        while bit < 8 {
-            let carry = register & 0x80 != 0;
-            register <<= 1;
-            if carry {
-                register ^= 0x2f;
-            }
-            bit += 1;
-        }
-        table[value] = register;
-        value += 1;
-    }
-    table
-};
+const TABLE: [u8; 256] = Crc::<u8>::new(&CRC_8_AUTOSAR).table()[0];
 
 /// One byte through the register.
 #[inline(always)]

@@ -1,5 +1,4 @@
 use super::*;
-use crc::{CRC_8_AUTOSAR, Crc};
 use proptest::prelude::*;
 
 /// Worked with an independent implementation of Profile 2 (the Python package autosar-e2e):
