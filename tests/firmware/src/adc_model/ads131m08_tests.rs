@@ -56,7 +56,7 @@ fn the_first_conversion_ends_when_table_8_3_says() {
     for (osr, t_clkin) in table {
         let mut part = running(Variant {
             wait: INITIAL_WAIT,
-            ..Variant::ALL[0]
+            ..Variant::default()
         });
         frame(&mut part, T_0 - 1000, 0x6180, 0xff02 | osr << 2);
         pulse(&mut part, T_0);
@@ -67,7 +67,7 @@ fn the_first_conversion_ends_when_table_8_3_says() {
 /// 8.3.7.1: unsettled data are not gated; 8.5.1.5: DRDY.
 #[test]
 fn after_a_resynchronisation_two_conversions_are_not_settled_and_drdy_falls_with_each() {
-    for variant in Variant::ALL {
+    for variant in Variant::all() {
         let mut part = running(variant);
         pulse(&mut part, T_0);
         let codes = [1, 2, 3, 4].map(|n| {
@@ -87,7 +87,7 @@ fn after_a_resynchronisation_two_conversions_are_not_settled_and_drdy_falls_with
 /// 8.5.1.5 and figure 8-21.
 #[test]
 fn drdy_does_not_fall_during_a_frame_but_after_it_if_a_conversion_is_left() {
-    for variant in Variant::ALL {
+    for variant in Variant::all() {
         let mut part = running(variant);
         pulse(&mut part, T_0);
         let first_ns = T_0 + (variant.wait + variant.delay + 128) * T_MOD_NS;

@@ -13,7 +13,7 @@ const LATE_NS: [i64; 4] = [-3000, 0, 3000, 40_000];
 /// its frames: every instruction takes its time.
 pub fn a_pose_has_its_instant(bench: &Bench) {
     let mut errors: Vec<f64> = Vec::new();
-    for variant in Variant::ALL {
+    for variant in Variant::all() {
         for late_ns in LATE_NS {
             let (lag_us, stamped_us) = lags_us(bench, variant, late_ns);
             let error_us = stamped_us - lag_us;

@@ -15,29 +15,24 @@ pub struct Variant {
 
 impl Default for Variant {
     fn default() -> Self {
-        Self::ALL[0]
+        Self {
+            wait: 44,
+            delay: 0,
+            late_pop: false,
+        }
     }
 }
 
 impl Variant {
     /// All plausible behaviours, the plainest first.
-    pub const ALL: [Self; 8] = {
-        let times = [(44, 0), (0, 0), (0, 44), (INITIAL_WAIT, 0)];
-        let mut all = [Self {
-            wait: 44,
-            delay: 0,
-            late_pop: false,
-        }; 8];
-        let mut k = 0;
-        while k < 8 {
-            let (wait, delay) = times[k / 2];
-            all[k] = Self {
+    pub fn all() -> impl Iterator<Item = Self> {
+        let times = [(44, 0), (0, 0), (0, 44), (INITIAL_WAIT, 0)].into_iter();
+        times.flat_map(|(wait, delay)| {
+            [false, true].map(|late_pop| Self {
                 wait,
                 delay,
-                late_pop: k % 2 == 1,
-            };
-            k += 1;
-        }
-        all
-    };
+                late_pop,
+            })
+        })
+    }
 }
