@@ -99,7 +99,10 @@ pub(super) fn updated(machine: &mut Machine, plan: &UpdateSettings) -> Updated {
 }
 
 pub(super) fn identity(machine: &mut Machine) -> Identity {
-    let (identity, _) = talk(machine, |talk| on::identify(talk));
+    let (identity, _) = talk(machine, |talk| {
+        let identity = on::identify(talk)?;
+        Ok(identity)
+    });
     identity.expect("an identity")
 }
 
