@@ -17,17 +17,16 @@ use hallstage_solver::estimator::probe::probes;
 use hallstage_solver::estimator::service::{Service, service_poses};
 use nalgebra::Vector3;
 
-/// An error of the reference that follows the motion bends a calibration by this part of it: measured on references that
-/// are held for 5 and 10 rows or interpolated over 5 to 25.
-const BENDS: f64 = 0.75;
+/// Beams that are held lose this part of what interpolated beams lose, once their lag is off: measured on five logs.
+const HELD: f64 = 0.2;
 
 /// The effect of a fault.
 enum Effect {
     /// A probe or a gap has an error in service: its variance, m2, and the part of it that is in the covariance of the
     /// channels already.
     Stays(f64, f64),
-    /// The reference has an error that follows the motion, rms m.
-    Bent(f64),
+    /// The reference has an error that follows the motion.
+    Bent,
     /// Its size is not known, or there is none in service.
     Unknown,
 }
@@ -35,19 +34,19 @@ enum Effect {
 /// The faults of the channels of all logs, one for each channel.
 pub(super) struct ColumnFaults {
     pub(super) findings: Vec<Finding>,
-    /// Variances of X, Y, Rz in service, m2, m2, rad2, because a bent reference bends the calibration, ...
-    pub(super) bent: [f64; 3],
-    /// ... and because sensors have these faults in service, too.
+    /// Variances of X, Y, Rz in service, m2, m2, rad2, because sensors have these faults there, too.
     pub(super) stays: [f64; 3],
 }
 
 impl ColumnFaults {
-    /// `parameters`: for the effect of an error of a channel on the pose.
+    /// `parameters`: for the effect of an error of a channel on the pose. Slow beams bend the calibration by the variances
+    /// `bent`.
     pub(super) fn new(
         columns: &[Column],
         dataset: &Dataset,
         stage: &Stage,
         parameters: &FieldParameters,
+        bent: [f64; 3],
     ) -> Self {
         let probes_m = probe_noise_m(columns).unwrap_or([USUAL_NOISE_M; 3]);
         let noise_m = median(&mut probes_m.clone()).unwrap_or(0.0);
@@ -62,10 +61,9 @@ impl ColumnFaults {
         let none = [0.0; 3];
         let mut out = Self {
             findings: Vec::new(),
-            bent: none,
             stays: none,
         };
-        // A finding, and its variances: by a bent calibration, and of sensors in service.
+        // A finding, and the variances of its sensor in service.
         let with_effect = |column: &Column, (kind, effect): (Kind, Effect)| {
             let found = Finding::new(kind).with_channel(column.channel);
             let (own, part, worst) = match effect {
@@ -74,16 +72,11 @@ impl ColumnFaults {
                     let own = effects.variances(&[column.channel], |_, _| m2);
                     (own, 1.0 - counted_m2 / m2, Severity::Warn)
                 }
-                Effect::Bent(m) => {
-                    let part = (BENDS * m / noise_m).powi(2);
-                    (floor.map(|of| of * part), 0.0, Severity::Refuse)
-                }
-                Effect::Unknown => return (found, none, none),
+                Effect::Bent => (bent, 0.0, Severity::Refuse),
+                Effect::Unknown => return (found, none),
             };
             let found = found.with_severity(severity(cost(own)).min(worst));
-            let is_bent = f64::from(u8::from(worst == Severity::Refuse));
-            let parts = [is_bent, part].map(|part| own.map(|of| of * part));
-            (found.with_cost(cost(own)), parts[0], parts[1])
+            (found.with_cost(cost(own)), own.map(|of| of * part))
         };
         for (log, source) in dataset.logs.iter().enumerate() {
             let own: Vec<&Column> = columns.iter().filter(|column| column.log == log).collect();
@@ -94,8 +87,8 @@ impl ColumnFaults {
                     let faults = faults(column, noise_m, source.rows.len());
                     // Harmless properties are in the table of channels only.
                     let mut felt = faults.map(|fault| with_effect(column, fault));
-                    let felt = felt.find(|(found, ..)| found.severity > Severity::Note);
-                    let Some((mut found, bent, own)) = felt else {
+                    let felt = felt.find(|(found, _)| found.severity > Severity::Note);
+                    let Some((mut found, own)) = felt else {
                         continue;
                     };
                     let first = column.outliers.first();
@@ -106,8 +99,6 @@ impl ColumnFaults {
                     }
                     out.findings.push(found);
                     stays = both(stays, own, |a, b| a + b);
-                    // The beams are slow together.
-                    out.bent = both(out.bent, bent, f64::max);
                 }
                 let channels: Vec<Channel> = kind.iter().map(|column| column.channel).collect();
                 let beyond = effects.variances(&channels, |i, j| kind[i].beyond_m2[j]);
@@ -135,6 +126,21 @@ impl ColumnFaults {
         }
         out
     }
+}
+
+/// What their rate takes off X, Y1, Y2: m per m/s2 of their own acceleration. A chord over a time T is off by T2 / 12 on
+/// average.
+pub(super) fn slow_beams_s2(columns: &[Column], dataset: &Dataset, stage: &Stage) -> [f64; 3] {
+    let mut sizes_s2 = [0.0; 3];
+    for column in columns.iter().filter(|column| column.channel.is_beam()) {
+        let Some(slow) = column.slow else { continue };
+        let period_s = dataset.period_s(dataset.logs[column.log].rows.clone());
+        let time_s = slow.every as f64 * period_s.unwrap_or(stage.servo_period_s);
+        let part = if slow.is_held { HELD } else { 1.0 };
+        let size_s2 = &mut sizes_s2[column.channel as usize - 3];
+        *size_s2 = f64::max(*size_s2, part * time_s * time_s / 12.0);
+    }
+    sizes_s2
 }
 
 fn both(a: [f64; 3], b: [f64; 3], of: fn(f64, f64) -> f64) -> [f64; 3] {
@@ -208,7 +214,6 @@ fn faults(
     let slow = |slow: SlowRate| Kind::SlowRate {
         rows: slow.every,
         is_held: slow.is_held,
-        error_um: 1e6 * slow.error_m,
     };
     // At lower rates motion is in the differences.
     let shows_noise = column.falls.is_some() && !column.is_rounded();
@@ -247,15 +252,15 @@ fn faults(
         true => Effect::Unknown,
         false => Effect::Stays(rounding_m2, 0.0),
     };
-    let of_rate = |slow: SlowRate| match is_beam {
-        true => Effect::Bent(slow.error_m),
+    let of_rate = match is_beam {
+        true => Effect::Bent,
         false => Effect::Unknown,
     };
     let faults = [
         column.overflows.map(overflow),
         is_coarse.then_some((steps, of_steps)),
         is_stuck.then_some((stuck, of_bits)),
-        column.slow.map(|rate| (slow(rate), of_rate(rate))),
+        column.slow.map(|rate| (slow(rate), of_rate)),
         (column.is_low_passed && column.slow.is_none())
             .then_some((Kind::LowPass {}, Effect::Unknown)),
         hum.map(|hum| (hum, in_service(line_m2))),

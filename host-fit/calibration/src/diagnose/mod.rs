@@ -59,7 +59,7 @@ use crate::judge::in_motion::{InMotion, UpTo};
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
-use faults::{Calibrated, Faults, find_faults};
+use faults::{Added, Calibrated, Faults, find_faults};
 use hallstage_input::channels::{Column, columns, probe_noise_m};
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding, Kind, Severity};
@@ -132,6 +132,7 @@ pub fn diagnose_log(
         is_for_service: field.is_some_and(|field| !field.comparison.by_resets),
         is_fitted: fitted.is_ok(),
         shows_acceleration: fitted.is_ok_and(|fit| fit.estimate.motion.shows_acceleration),
+        slow_beams_s2: columns::slow_beams_s2(&out.columns, logged, stage),
     };
     // A log that determines no parameters shows nothing of its channels.
     let is_described = match fitted {
@@ -140,14 +141,14 @@ pub fn diagnose_log(
     };
     let estimate = field.and(fitted.ok()).map(|fit| &fit.estimate);
     let described = (is_described, estimate);
-    let found = out.add_faults(dataset, &without_outliers, stage, by, described);
+    let added = out.add_faults(dataset, &without_outliers, stage, by, described);
     match fitted {
         Ok(fit) => out.add_fit(fit, dataset, stage),
         Err(_) => out.predicted = None,
     }
     (out.findings).extend(fit_checks::short_movements(fitted.ok(), dataset));
-    let columns = ColumnFaults::new(&out.columns, logged, stage, &start);
-    out.predicted = (out.predicted).map(|predicted| predicted.with_added(columns.bent));
+    let columns = ColumnFaults::new(&out.columns, logged, stage, &start, added.bent);
+    out.predicted = (out.predicted).map(|predicted| predicted.with_added(added.bent));
     out.findings.extend(columns.findings);
     let is_for_service = by.is_for_service;
     let basis = match fitted {
@@ -165,19 +166,18 @@ pub fn diagnose_log(
                 ..repair.motion
             };
         }
-        if let Some(lags_s) = found.and_then(|(lags_s, _)| lags_s) {
+        if let Some(lags_s) = added.probe_lags_s {
             motion = motion.with_other_lags(lags_s);
         }
         InMotion::new(&motion, parameters, stage, &at_rest?)
     });
     out.up_to = out.motion.map(|motion| motion.up_to);
-    let (_, drifts) = found.unwrap_or_default();
     let late = out
         .findings
         .iter()
         .filter_map(|found| late::in_service(found, stage));
     let motion = out.motion.iter().map(|motion| motion.added);
-    let stays = late.chain(motion).chain([columns.stays, drifts]);
+    let stays = late.chain(motion).chain([columns.stays, added.drifts]);
     let stays = stays.fold([0.0; 3], |sum, of| {
         [0, 1, 2].map(|axis| sum[axis] + of[axis])
     });
@@ -208,8 +208,8 @@ const fn stands(found: &Finding) -> bool {
 }
 
 impl Diagnosis {
-    /// Adds the faults of signals, channels and structure, and what they predict. The lags of A, B, C behind their
-    /// mean, s, where the log shows them, and the variances that drifts add in service. `is_described` where the parameters describe the log, `estimate` of a fit of the field model.
+    /// Adds the faults of signals, channels and structure, and what they predict. `is_described` where the parameters
+    /// describe the log, `estimate` of a fit of the field model.
     fn add_faults(
         &mut self,
         dataset: &Dataset,
@@ -217,7 +217,7 @@ impl Diagnosis {
         stage: &Stage,
         by: Calibrated,
         (is_described, estimate): (bool, Option<&Estimate>),
-    ) -> Option<(Option<[f64; 3]>, [f64; 3])> {
+    ) -> Added {
         let (findings, bad) = signals::signal_findings(dataset, stage, &self.columns);
         self.findings = findings;
         let is_bent = self.findings.iter().any(stands);
@@ -246,11 +246,11 @@ impl Diagnosis {
             repaired.is_none() || matches!(found.kind, Kind::Mistake { is_sure: true, .. })
         };
         self.findings.extend(mistake.filter(stands_alone));
-        let mut of = of_rows?;
         // Channels in another order, or rows without a channel, show nothing of service.
-        if is_refused(&self.findings) {
-            return None;
-        }
+        let shown = of_rows.filter(|_| !is_refused(&self.findings));
+        let Some(mut of) = shown else {
+            return Added::default();
+        };
         self.predicted = of.predicted;
         if let Some((repair, expected)) = of.repair {
             let stand = self.findings.iter_mut().filter(|found| stands(found));
@@ -262,7 +262,7 @@ impl Diagnosis {
             (self.predicted, self.repair) = (Some(expected), Some(repair));
         }
         self.findings.extend(of.findings);
-        Some((of.probe_lags_s, of.drifts))
+        of.added
     }
 
     /// Adds the findings about the fit that no fault explains.
@@ -343,8 +343,9 @@ pub fn diagnose_blob(
         is_for_service,
         is_fitted: false,
         shows_acceleration: set.motion_correction.is_some(),
+        slow_beams_s2: columns::slow_beams_s2(&out.columns, dataset, stage),
     };
-    out.add_faults(dataset, dataset, stage, by, (true, None));
+    let added = out.add_faults(dataset, dataset, stage, by, (true, None));
     out.findings.extend(range::out_of_range(set, dataset));
     let temperature = &set.constants.temperature;
     (out.findings).extend(temperature::missing(temperature, dataset));
@@ -369,7 +370,7 @@ pub fn diagnose_blob(
                 Basis::Blob { is_for_service }
             }
         };
-    let columns = ColumnFaults::new(&out.columns, dataset, stage, parameters);
+    let columns = ColumnFaults::new(&out.columns, dataset, stage, parameters, added.bent);
     out.findings.extend(columns.findings);
     out.conclude(columns.stays, basis);
     out

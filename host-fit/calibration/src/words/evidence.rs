@@ -65,9 +65,9 @@ pub(super) fn evidence(found: &Finding) -> String {
         Kind::Noisy { noise_um, ratio } => format!("the noise of {on} is {noise_um:.2} µm, {ratio:.1} times the noise of the others{}", cost(found)),
         Kind::GroupNoise { percent: 0.0 } => format!("the noise of {on} is not even: it has lines, or times with more{}", cost(found)),
         Kind::GroupNoise { percent } => format!("{percent:.0} % of the noise of {on} is the same in all of them{}", cost(found)),
-        Kind::SlowRate { rows, is_held, error_um } => {
+        Kind::SlowRate { rows, is_held } => {
             let between = if *is_held { "hold the last one" } else { "are interpolated" };
-            format!("{on} has a new value in one of {rows} rows, and the rows between {between}. This takes about {error_um:.2} µm rms off the motion{}", cost(found))
+            format!("{on} has a new value in one of {rows} rows, and the rows between {between}{}", cost(found))
         }
         Kind::LowPass {} => format!("the noise of {on} falls towards high frequencies like the noise of an average or a low-pass filter, which weakens and delays fast motion, too"),
         Kind::Filled { rows } => format!("{on} runs on a straight line in {}, as where a gap was filled", counted(*rows, "row")),

@@ -27,8 +27,6 @@ pub struct SlowRate {
     pub every: usize,
     /// Whether values are held in between; else they are interpolated.
     pub is_held: bool,
-    /// The rms error that this makes of the motion, m; a constant lag is no part of it.
-    pub error_m: f64,
 }
 
 /// The rate of new values where there is not one in each row.
@@ -54,13 +52,7 @@ pub(super) fn slow(signal: &Signal, step: f64) -> Option<SlowRate> {
     }
     let powers = (2..=EVERY_MAX).map(|every| (every, power(&blocks, every)));
     let (every, most) = powers.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    // The parabola between two knots: second difference x t (1 - t) / 2. Values that are held lose as much.
-    let error = curvature(signal, every) / 120f64.sqrt();
-    (most > PATTERN).then_some(SlowRate {
-        every,
-        is_held,
-        error_m: error * signal.unit_m,
-    })
+    (most > PATTERN).then_some(SlowRate { every, is_held })
 }
 
 /// The longest run of rows on a straight line that is not level, where chance does not make it. The noise is larger than
@@ -92,16 +84,6 @@ fn second(three: [f64; 3]) -> f64 {
 
 fn is_straight(three: &[f64], step: f64) -> bool {
     second([three[0], three[1], three[2]]).abs() <= step
-}
-
-/// The rms of the second differences of rows that are this far apart.
-fn curvature(signal: &Signal, apart: usize) -> f64 {
-    let all = signal.runs().flat_map(|run| run.windows(2 * apart + 1));
-    let squares = all.map(|run| second([run[0], run[apart], run[2 * apart]]).powi(2));
-    let (count, sum) = squares.fold((0.0, 0.0), |(count, sum), square| {
-        (count + 1.0, sum + square)
-    });
-    (sum / f64::max(count, 1.0)).sqrt()
 }
 
 /// The logarithms of the differences of this order, in blocks of consecutive rows.

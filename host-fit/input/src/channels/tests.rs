@@ -99,7 +99,7 @@ fn a_counter_that_overflows_has_its_bits_and_an_outlier_is_none() {
 }
 
 #[test]
-fn a_slow_rate_is_named_with_its_error() {
+fn a_slow_rate_is_named() {
     for every in [2, 5, 10] {
         let held = with_beam_x(|nm| (0..nm.len()).map(|k| nm[k - k % every]).collect());
         let slow = held.slow.expect("held");
@@ -114,22 +114,6 @@ fn a_slow_rate_is_named_with_its_error() {
         };
         let slow = with_beam_x(lines).slow.expect("interpolated");
         assert_eq!((slow.every, slow.is_held), (every, false));
-        let dataset = sound();
-        let nm: Vec<f64> = dataset
-            .rows
-            .iter()
-            .map(|row| row.reference[0] * 1e9)
-            .collect();
-        let squares = nm
-            .iter()
-            .zip(lines(&nm))
-            .map(|(true_nm, nm)| (true_nm - nm).powi(2));
-        let error_m = 1e-9 * (squares.sum::<f64>() / nm.len() as f64).sqrt();
-        // The noise of 6 nm is no motion.
-        assert!(
-            (slow.error_m - error_m).abs() < 0.15 * error_m + 8e-9,
-            "{every}: {slow:?} {error_m}"
-        );
     }
 }
 

@@ -176,7 +176,7 @@ kinds! {
     /// Noise of a kind of channels beyond the noise that each has of its own all the time; the part that all have at once.
     GroupNoise { percent: f64 } => Code::Noisy, *percent, "%";
     /// New values come every few rows, and values between them are held or interpolated; the lost motion.
-    SlowRate { rows: usize, is_held: bool, error_um: f64 } => Code::Slow, *rows as f64, "rows";
+    SlowRate { rows: usize, is_held: bool } => Code::Slow, *rows as f64, "rows";
     /// The noise falls towards high frequencies by more than a sensor's does.
     LowPass {} => Code::Slow;
     /// A gap in a channel is filled by a line.

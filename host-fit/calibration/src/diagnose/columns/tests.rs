@@ -14,7 +14,13 @@ fn faults_of(fault: impl Fn(usize, &mut Row)) -> ColumnFaults {
     let rows = dataset.rows.iter_mut().enumerate();
     rows.for_each(|(k, row)| fault(k, row));
     let parameters = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
-    ColumnFaults::new(&columns(&dataset, &stage), &dataset, &stage, &parameters)
+    ColumnFaults::new(
+        &columns(&dataset, &stage),
+        &dataset,
+        &stage,
+        &parameters,
+        [0.0; 3],
+    )
 }
 
 /// The only finding: its code, channel and cost.

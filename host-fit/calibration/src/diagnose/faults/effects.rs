@@ -51,11 +51,7 @@ pub(super) struct Suspect {
 pub(super) fn suspects(with_motion: bool) -> impl Iterator<Item = Suspect> {
     use Follows::{Gain, Heat, OwnAcceleration, OwnSpeed, Sag, Turning};
     let of_channel = |first: usize| {
-        Follows::of_channel(first).map(move |follows| Suspect {
-            follows,
-            first,
-            count: 1,
-        })
+        Follows::of_channel(first).map(move |follows| Suspect::single(follows, first))
     };
     let gains = [(Gain, 0), (Gain, 3), (Gain, 6)];
     let times = [(OwnSpeed, 3), (OwnSpeed, 6)];
@@ -71,10 +67,10 @@ pub(super) fn suspects(with_motion: bool) -> impl Iterator<Item = Suspect> {
 }
 
 impl Suspect {
-    /// The time of a channel.
-    pub(super) const fn late(first: usize) -> Self {
+    /// An error of one channel.
+    pub(super) const fn single(follows: Follows, first: usize) -> Self {
         Self {
-            follows: Follows::OwnSpeed,
+            follows,
             first,
             count: 1,
         }

@@ -162,9 +162,22 @@ impl Estimate {
         &self.at.values.as_slice()[UNKNOWNS..]
     }
 
-    /// The part of a unit of a fault in the gradient of the parameters.
-    pub(super) fn gradient(&self, fault: usize) -> DVector<f64> {
-        DVector::from_fn(UNKNOWNS, |k, _| self.squares[(k, UNKNOWNS + fault)])
+    /// The error of the parameters in a fit of this curvature that does not know of these faults, by number and size.
+    pub(super) fn off_by(
+        &self,
+        curvature: &Factor,
+        faults: impl Iterator<Item = (usize, f64)>,
+    ) -> Vec<f64> {
+        let faults: Vec<(usize, f64)> = faults.collect();
+        let gradient = |k: usize, fault: usize| self.squares[(k, UNKNOWNS + fault)];
+        let sum = |k: usize| {
+            faults
+                .iter()
+                .map(|(fault, size)| gradient(k, *fault) * size)
+                .sum()
+        };
+        let off = curvature.solve(&DVector::from_fn(UNKNOWNS, |k, _| sum(k)));
+        off.as_slice()[..COUNT].to_vec()
     }
 
     /// The covariance of all unknowns. Where terms are larger than usual, also the others are, and their prior pulls
@@ -245,6 +258,7 @@ impl Estimate {
 mod tests {
     use super::*;
     use crate::diagnose::faults::effects::{Effects, Shape, Suspect};
+    use crate::diagnose::faults::motion::Follows;
     use hallstage_input::shipped::stage;
     use hallstage_simulate::assembly::Assembly;
     use hallstage_simulate::pose::StagePose;
@@ -304,7 +318,7 @@ mod tests {
         let designed = FieldParameters::from_model_31(&Parameters::designed(&stage), &stage);
         let means = Means::new(&log, &stage, &designed, false);
         let effects = Effects::new(&means, &stage, &designed, 0.0);
-        let late = [4, 5, 0, 1].map(Suspect::late);
+        let late = [4, 5, 0, 1].map(|channel| Suspect::single(Follows::OwnSpeed, channel));
         let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
         let estimate = Estimate::new(&means, &designed, &late).expect("an estimate");
         let [x, y, _] = estimate.noise.drift;

@@ -46,6 +46,7 @@ use hallstage_solver::estimator::parameters::FieldParameters;
 use hallstage_solver::estimator::service::Service;
 use hallstage_solver::estimator::terms::{COUNT, PER_PROBE};
 use means::Means;
+use motion::Follows;
 use runtime::ModelKind;
 use score::{Fault, Split, split};
 
@@ -62,12 +63,21 @@ pub struct Faults {
     /// The parameters without the faults, and their errors in service, where the faults are clear and this
     /// makes a good calibration.
     pub repair: Option<(Repair, Predicted)>,
-    /// Lags of A, B, C behind their mean, s, where the log shows them.
-    pub probe_lags_s: Option<[f64; 3]>,
-    /// Variances that drifts of the probes add in service: m2, m2, rad2.
-    pub drifts: [f64; 3],
+    /// What they add in service beside [`Self::predicted`].
+    pub added: Added,
     /// The residuals over their noise, after all faults: 1 for a sound log.
     pub residual: f64,
+}
+
+/// What faults add in service: variances of X, Y, Rz in m2, m2, rad2.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Added {
+    /// Lags of A, B, C behind their mean, s, where the log shows them.
+    pub probe_lags_s: Option<[f64; 3]>,
+    /// By drifts of the probes.
+    pub drifts: [f64; 3],
+    /// By a calibration that beams with a slow rate bend.
+    pub bent: [f64; 3],
 }
 
 /// The calibration that a log is judged by.
@@ -87,6 +97,8 @@ pub struct Calibrated<'a> {
     pub is_fitted: bool,
     /// Whether the fit determined what acceleration adds to the readings.
     pub shows_acceleration: bool,
+    /// What their rate takes off X, Y1, Y2: m per m/s2 of their own acceleration.
+    pub slow_beams_s2: [f64; 3],
 }
 
 /// The faults in the rows of a log that the tests of the signals leave; `is_bent` if the fit had other rows, too.
@@ -107,7 +119,7 @@ pub fn find_faults(
     };
     let effects = Effects::new(&finder.means, stage, start, 0.0);
     // Probes and beams may be late, and a lag is no noise.
-    let late = [4, 5, 0, 1].map(Suspect::late);
+    let late = [4, 5, 0, 1].map(|channel| Suspect::single(Follows::OwnSpeed, channel));
     let late = late.map(|suspect| effects.shaped(suspect, Shape::From(0, usize::MAX)));
     finder.faults(&Estimate::new(&finder.means, start, &late)?)
 }
@@ -187,6 +199,7 @@ impl Finder<'_> {
             }
             None => self.priced(&faults, (faultless, estimate), &declared)?,
         };
+        out.added.bent = self.bent(faultless, &declared)?;
         if is_open {
             let open = not_determined(&own).with_severity(Severity::Warn);
             out.findings.insert(0, open);
@@ -194,7 +207,28 @@ impl Finder<'_> {
         Some(out)
     }
 
-    /// Two stages are a fault with a known onset that explain more than all faults, which leave this chi-square.
+    /// Variances of X, Y, Rz in service because beams with a slow rate bend the calibration.
+    fn bent(&self, faultless: &Estimate, declared: &Service) -> Option<[f64; 3]> {
+        let sizes_s2 = self.calibrated.slow_beams_s2;
+        let beams = || (0..3).filter(|&beam| sizes_s2[beam] > 0.0);
+        let faults = beams().map(|beam| Fault {
+            suspect: Suspect::single(Follows::OwnAcceleration, 3 + beam),
+            shape: Shape::From(0, usize::MAX),
+            gain: 0.0,
+            alike: Vec::new(),
+        });
+        let faults: Vec<Fault> = faults.collect();
+        if faults.is_empty() {
+            return Some([0.0; 3]);
+        }
+        let with = self.refitted(faultless, &faults)?;
+        // A unit of the fault is 1 um per m/s2.
+        let sizes = beams().map(|beam| 1e6 * sizes_s2[beam]).enumerate();
+        Some(declared.squares(&with.off_by(&self.own_curvature(&with)?, sizes)))
+    }
+
+    /// Two stages in one log: a fault with a known onset that explains more than all faults. `left` is the chi-square after
+    /// all faults.
     fn other_part(&self, faultless: &Estimate, faults: &[Fault], left: f64) -> Option<Split> {
         let gain = |to: f64| self.gain(faultless.chi_squared, to);
         let needs = (0..faults.len()).map(|number| self.needs(&faults[number], &faults[..number]));

@@ -4,7 +4,7 @@ use super::estimate::Estimate;
 use super::motion::{Follows, squares_at_work};
 use super::score::Fault;
 use super::slow::slow_m2;
-use super::{Faults, Finder};
+use super::{Added, Faults, Finder};
 use crate::fit::Repair;
 use crate::judge::predicted::Predicted;
 use crate::judge::verdict::{GOOD_MAX, NOTE_MAX, severity};
@@ -13,8 +13,7 @@ use hallstage_input::finding::{Finding, Kind, Quantity, Severity};
 use hallstage_solver::estimator::dynamics::MotionFit;
 use hallstage_solver::estimator::service::Service;
 use hallstage_solver::estimator::terms::COUNT;
-use hallstage_solver::estimator::whiten::UNKNOWNS;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use runtime::ModelKind;
 
 /// Maximum number of repairs per channel. Steps and ramps can follow any other course, but do not describe it.
@@ -131,11 +130,8 @@ impl Finder<'_> {
         let sizes = estimate.sizes();
         let follows = |number: &usize| faults[*number].suspect.quantity().is_none();
         let (by_motion, changes): (Vec<usize>, Vec<usize>) = (0..faults.len()).partition(follows);
-        let off_by = |numbers: &[usize]| {
-            let gradients = numbers.iter().map(|&k| estimate.gradient(k) * sizes[k]);
-            let sum = gradients.fold(DVector::zeros(UNKNOWNS), |sum, of| sum + of);
-            bent.solve(&sum).as_slice()[..COUNT].to_vec()
-        };
+        let off_by =
+            |numbers: &[usize]| estimate.off_by(&bent, numbers.iter().map(|&k| (k, sizes[k])));
         let mut events: Vec<Vec<usize>> = Vec::new();
         for &number in &changes {
             let is_same =
@@ -213,8 +209,11 @@ impl Finder<'_> {
         Some(Faults {
             findings,
             predicted: Some(predicted),
-            probe_lags_s: (!faults.is_empty()).then_some(stays.probe_lags_s),
-            drifts,
+            added: Added {
+                probe_lags_s: (!faults.is_empty()).then_some(stays.probe_lags_s),
+                drifts,
+                ..Added::default()
+            },
             repair: is_better.then_some((repair, expected)),
             residual,
         })

@@ -1,9 +1,11 @@
 //! What is predicted of service, against service.
 
+use super::tests::recording;
 use crate::diagnose::{Diagnosis, diagnose_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};
 use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
+use crate::service_for_tests::worst_ratio;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::shipped::stage;
 use hallstage_input::stage::Stage;
@@ -83,4 +85,36 @@ fn declared_errors_of_resets_let_the_field_model_serve_on_a_log_of_the_paper() {
             .fold(0.0, f64::max)
     };
     assert!(worst(after) < 0.7 * worst(before), "{after:?} {before:?}");
+}
+
+/// The beams have a new value in every tenth row, and lines between. Whatever the motion, the prediction holds.
+#[test]
+fn a_reference_at_a_lower_rate_costs_what_is_predicted() {
+    const EVERY: usize = 10;
+    let stage = stage();
+    for seed in [3, 4] {
+        let mut slow = recording(seed);
+        for samples in &mut slow.movements {
+            let nm: Vec<[i64; 3]> = samples.iter().map(|sample| sample.beams_nm).collect();
+            for (k, sample) in samples.iter_mut().enumerate() {
+                let (start, part) = (k - k % EVERY, (k % EVERY) as i64);
+                let end = (start + EVERY).min(nm.len() - 1);
+                let between = |from: i64, to: i64| from + part * (to - from) / EVERY as i64;
+                sample.beams_nm = [0, 1, 2].map(|beam| between(nm[start][beam], nm[end][beam]));
+            }
+        }
+        let dataset = slow.dataset(&stage).expect("a triangle");
+        let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
+        let diagnosis = diagnose_log(&dataset, &stage, Ok(&fitted));
+        let predicted = diagnosis.predicted.expect("figures");
+        let constants = fitted.estimate.parameters.constants(1.0).expect("a pose");
+        let floor = [0, 1, 2].map(|axis| predicted.noise(axis));
+        let shown = worst_ratio(&constants, &Assembly::draw(&stage, seed), seed, floor);
+        let ratio = predicted.worst_ratio();
+        let close = 0.7 * shown..1.4 * shown;
+        assert!(
+            shown > 2.0 && close.contains(&ratio),
+            "{seed}: {ratio} {shown}"
+        );
+    }
 }
