@@ -295,3 +295,21 @@ fn an_edge_out_of_its_turn_gives_no_wrong_instant() {
         assert!(refused > 0.0 && refused < 60.0, "{refused}");
     }
 }
+
+#[test]
+fn no_drawn_timing_gives_a_wrong_instant() {
+    let mut chance = Words(1);
+    for seed in 0..60 {
+        let mut between =
+            |from: f64, to: f64| from + (to - from) * f64::from(chance.below(1000)) / 1000.0;
+        let board = Board {
+            spi_mhz: between(3.0, 20.0),
+            gap_us: between(0.0, 15.0),
+            preempted_us: between(-100.0, 300.0).max(0.0),
+            clkin_mhz: between(7.2, 8.8),
+            fast: between(-0.06, 0.06),
+            ..USUAL
+        };
+        worst(board, seed);
+    }
+}
