@@ -104,7 +104,9 @@ pub fn structure(
 ) -> Option<Finding> {
     let planar = Model::from_kind(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
-    let by_itself = fitted(dataset, stage.servo_period_s);
+    // A log may be thinned.
+    let period_s = dataset.period_s(0..dataset.rows.len());
+    let by_itself = fitted(dataset, period_s.unwrap_or(stage.servo_period_s));
     let each = by_itself.iter().flatten().zip(Channel::SINGLE);
     let strange = each.filter_map(|(of, channel)| (of.left > LEFT_MAX).then_some(channel));
     let strange: Vec<Channel> = strange.collect();
