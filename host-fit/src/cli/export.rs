@@ -1,6 +1,7 @@
 //! `host-fit export`.
 
 use super::arguments::choice;
+use super::inspect;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
@@ -67,6 +68,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
     super::check_outputs([Some(out.as_path())], None, [args.params.as_path()])?;
     kept::check_own(&out, kept::IMAGE)?;
     write_atomically(&out, &file)?;
+    inspect::warn_if_forced(&set);
     let places: Vec<_> = addresses.iter().map(|at| format!("{at:#010x}")).collect();
     terminal::print(&format!(
         "wrote {}: {} bytes for {}\n",

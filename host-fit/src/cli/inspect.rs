@@ -51,13 +51,18 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     let repaired = repaired.unwrap_or_default();
     let taken_off = repaired.iter().map(|fault| format!("taken off: {fault}"));
     terminal::warn(&taken_off.collect::<Vec<_>>());
+    warn_if_forced(&set);
+    Ok(())
+}
+
+/// Warns of a blob that was written with `--force`.
+pub(super) fn warn_if_forced(set: &ParameterSet) {
     if set.fit.forced {
         terminal::warn(&[
             "the log was refused, or the errors beyond --limit: written all the same (--force)"
                 .to_owned(),
         ]);
     }
-    Ok(())
 }
 
 /// rms and peak of X, Y, Rz as a blob or a controller holds them.

@@ -1,6 +1,7 @@
 //! `host-fit update`.
 
 use super::identify;
+use super::inspect;
 use super::interrupt;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
@@ -68,6 +69,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
 /// The blob, unless it belongs to another stage than `--serial` says.
 fn read_blob(path: &Path, asked: Option<&str>) -> Result<Vec<u8>, HostError> {
     let set = blob_file::read(path)?;
+    inspect::warn_if_forced(&set);
     let own = set.serial.as_str();
     match asked {
         Some(asked) if !own.is_empty() && asked != own => {

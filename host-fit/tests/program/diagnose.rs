@@ -68,8 +68,10 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
             coloured.contains("\x1b[1m\x1b[31mRefused\x1b[0m\n"),
             "{coloured}"
         );
-        let inspect = bench.good("inspect p.bin --json i.json");
-        assert!(stderr(&inspect).contains("(--force)"));
+        for command in ["inspect p.bin --json i.json", "export p.bin --out p.hex"] {
+            assert!(stderr(&bench.good(command)).contains("(--force)"));
+        }
+        std::fs::remove_file(bench.path("p.hex")).expect("removed");
         assert_eq!(bench.json("i.json")["fit"]["forced"], true);
         std::fs::remove_file(bench.path("p.bin")).expect("removed");
     }
