@@ -7,9 +7,7 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Content, Mailbox, Request};
-use hal_adapters::can::update::{
-    BlobId, Identity, NotWritten, Receiver, Running, Store, Updates,
-};
+use hal_adapters::can::update::{BlobId, Identity, NotWritten, Receiver, Running, Store, Updates};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
