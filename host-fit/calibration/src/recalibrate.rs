@@ -33,14 +33,10 @@ use crate::budget::Budget;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::{BlobUse, Diagnosis, diagnose_blob};
 use crate::fit::{RANGE_MARGIN, calibration};
-use crate::judge::in_motion::by_lags;
 use crate::judge::predicted::{Predicted, Validity, declared_service};
-use crate::judge::verdict::{GOOD_MAX, Verdict};
 use crate::judge::{Decoded, Judgement, Zeros};
-use hallstage_input::channel::Channel;
 use hallstage_input::channels::columns;
 use hallstage_input::dataset::Dataset;
-use hallstage_input::finding::{Finding, Kind, Quantity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::error::FieldFitError;
 use hallstage_solver::estimator::model::Model;
@@ -225,14 +221,7 @@ pub fn recalibrate(
         known.and_then(|_| Validity::new(stage, &update.parameters, white_m, covariance));
     let temperature = set.constants.temperature.rounded();
     let of_posterior = (&update.parameters, &update.posterior);
-    let mut diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(Some(predicted)));
-    let late = by_lags(lags_s(&diagnosis.findings), &update.parameters, stage);
-    let late = late.unwrap_or_default();
-    diagnosis.predicted = diagnosis.predicted.map(|of| of.with_added(late));
-    let is_limited = (diagnosis.predicted).is_some_and(|of| of.worst_ratio() > GOOD_MAX);
-    if is_limited && diagnosis.verdict == Some(Verdict::Good) {
-        diagnosis.verdict = Some(Verdict::Limited);
-    }
+    let diagnosis = diagnose_blob(dataset, stage, &set, BlobUse::Recalibrated(Some(predicted)));
     // With what the sensors add in service.
     let budget = (diagnosis.predicted.as_ref())
         .filter(|_| known.is_some())
@@ -270,24 +259,6 @@ pub fn recalibrate(
         judgement,
         judgement_before,
         diagnosis,
-    })
-}
-
-/// The lags of probes that findings name, s: in service they stay.
-fn lags_s(findings: &[Finding]) -> [f64; 3] {
-    [Channel::HallA, Channel::HallB, Channel::HallC].map(|probe| {
-        let of_probe = findings
-            .iter()
-            .filter(|found| found.channels.contains(&probe));
-        let lag_s = of_probe.map(|found| match found.kind {
-            Kind::Change {
-                quantity: Quantity::Time,
-                size,
-                ..
-            } => 1e-3 * size,
-            _ => 0.0,
-        });
-        lag_s.sum()
     })
 }
 

@@ -4,7 +4,7 @@ use crate::fit::{Fit, Repair, is_clear, is_significant};
 use crate::judge::predicted::Predicted;
 use crate::judge::verdict::{GOOD_MAX, severity};
 use hallstage_input::channel::Channel;
-use hallstage_input::finding::{Code, Finding, Kind, Severity};
+use hallstage_input::finding::{Code, Finding, Kind, Quantity, Severity};
 use hallstage_input::stage::Stage;
 use hallstage_solver::estimator::sandwich::ReferenceLag;
 
@@ -58,6 +58,24 @@ pub(super) fn in_service(found: &Finding, stage: &Stage) -> Option<[f64; 3]> {
         } => Some(by_late_probes(lag_us * 1e-6, stage)),
         _ => None,
     }
+}
+
+/// The lags of probes that findings name, s: in service they stay.
+pub(super) fn probe_lags_s(findings: &[Finding]) -> [f64; 3] {
+    [Channel::HallA, Channel::HallB, Channel::HallC].map(|probe| {
+        let of_probe = findings
+            .iter()
+            .filter(|found| found.channels.contains(&probe));
+        let lag_s = of_probe.map(|found| match found.kind {
+            Kind::Change {
+                quantity: Quantity::Time,
+                size,
+                ..
+            } => 1e-3 * size,
+            _ => 0.0,
+        });
+        lag_s.sum()
+    })
 }
 
 /// A lag of the reference that is clear, or that costs more than a note in service if it is a lag of all probes. Where the

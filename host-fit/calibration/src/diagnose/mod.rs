@@ -55,7 +55,7 @@ mod units;
 use crate::budget::Budget;
 use crate::fit::{Estimate, Fit, FitError, Repair};
 use crate::judge::identify::FitFailure;
-use crate::judge::in_motion::{InMotion, UpTo};
+use crate::judge::in_motion::{InMotion, UpTo, by_lags};
 use crate::judge::predicted::{Predicted, Validity};
 use crate::judge::verdict::{Basis, LIMITED_MAX, Verdict, conclude, is_refused};
 use columns::ColumnFaults;
@@ -372,6 +372,12 @@ pub fn diagnose_blob(
         };
     let columns = ColumnFaults::new(&out.columns, dataset, stage, parameters, added.bent);
     out.findings.extend(columns.findings);
-    out.conclude(columns.stays, basis);
+    let late = match basis {
+        Basis::Recalibrated => by_lags(late::probe_lags_s(&out.findings), parameters, stage),
+        _ => None,
+    };
+    let late = late.unwrap_or_default();
+    let stays = [0, 1, 2].map(|axis| columns.stays[axis] + late[axis]);
+    out.conclude(stays, basis);
     out
 }
