@@ -137,7 +137,7 @@ mod tests {
         assert_eq!((first.record.faults, second.record.faults), (1, 1));
         let bitten = Before::new(Cause::Watchdog, Some(run(7, None)));
         assert_eq!((bitten.by_fault, bitten.record.faults), (true, 1));
-        // A panic whose handler waits for the watchdog.
+        // The handler of the panic waits for the watchdog.
         let panic = run(7, Some(FaultKind::Panic));
         let bitten = Before::new(Cause::Watchdog, Some(panic));
         assert_eq!(

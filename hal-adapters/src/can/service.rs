@@ -222,7 +222,7 @@ impl Service {
         (Outcome::Done, 0)
     }
 
-    /// Starts a re-zero of so many ticks, or clears the zero.
+    /// Starts a re-zero of this number of ticks, or clears the zero.
     fn zero<D: Decode>(
         &mut self,
         ticks: Option<u16>,

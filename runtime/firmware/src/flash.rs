@@ -54,7 +54,7 @@ const fn address(offset: u32) -> *mut u8 {
 }
 
 impl Sectors {
-    /// Opens FLASH_CR, does an operation of at most so many looks, and locks it again. The operation sets PSIZE to x32,
+    /// Opens FLASH_CR, does an operation that ends within this number of looks, and locks it again. The operation sets PSIZE to x32,
     /// which needs at least 2.7 V (table 13).
     fn operate(&mut self, looks: u32, start: impl FnOnce(&FLASH)) -> Result<(), NorFlashErrorKind> {
         let Self(registers) = self;

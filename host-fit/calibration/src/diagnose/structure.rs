@@ -284,11 +284,9 @@ impl Drawing {
 
     /// Sum of squared differences of three probes over tolerances and uncertainties of the fit.
     fn distance(&self, fitted: &[Fitted; 3], change: &Transform) -> f64 {
-        let of_probe = |probe| {
-            self.distance_of(probe, fitted, change)
-                .unwrap_or(f64::INFINITY)
-        };
-        (0..3).map(of_probe).sum()
+        let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
+        let all = (0..3).map(of_probe);
+        all.map(|of| of.unwrap_or(f64::INFINITY)).sum()
     }
 
     fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Transform) -> Option<f64> {

@@ -175,7 +175,7 @@ kinds! {
     Noisy { noise_um: f64, ratio: f64 } => Code::Noisy, *ratio, "times";
     /// Noise of a kind of channels beyond the noise that each has of its own all the time; the part that all have at once.
     GroupNoise { percent: f64 } => Code::Noisy, *percent, "%";
-    /// New values come every few rows, and values between them are held or interpolated; the lost motion.
+    /// New values come every few rows, and values between them are held or interpolated.
     SlowRate { rows: usize, is_held: bool } => Code::Slow, *rows as f64, "rows";
     /// The noise falls towards high frequencies by more than a sensor's does.
     LowPass {} => Code::Slow;
